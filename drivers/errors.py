@@ -3,8 +3,6 @@
 A failure without a reaction of its own is a plain :class:`hexacell.errors.DeviceError`.
 """
 
-from __future__ import annotations
-
 from drivers.interfaces import StartupAction
 from hexacell.errors import DeviceError
 

@@ -6,8 +6,6 @@ the others or a stop. Every failure is a :class:`hexacell.errors.DeviceError` th
 those that a run reacts to in a way of their own are in :mod:`drivers.errors`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol, TypeVar, runtime_checkable

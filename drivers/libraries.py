@@ -1,7 +1,5 @@
 """Libraries that only some devices need: imported when a cell has one of these, and named when missing."""
 
-from __future__ import annotations
-
 import functools
 import inspect
 from collections.abc import Awaitable, Callable

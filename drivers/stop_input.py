@@ -6,8 +6,6 @@ that opens it, a broken wire and an unplugged adapter all forbid motion. The fil
 programs, and for cells without such a contact: while it exists, nothing moves.
 """
 
-from __future__ import annotations
-
 import termios
 from pathlib import Path
 

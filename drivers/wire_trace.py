@@ -1,7 +1,5 @@
 """The wire trace: every byte sent and received on the lines to the devices, with its time."""
 
-from __future__ import annotations
-
 import logging
 import re
 import threading

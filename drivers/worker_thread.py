@@ -4,8 +4,6 @@ An executor of the standard library does the same with a lock, a condition and t
 loop a job, which is a tenth of a round of encoders on a fast bus.
 """
 
-from __future__ import annotations
-
 import asyncio
 import threading
 import weakref

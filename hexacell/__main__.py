@@ -1,7 +1,5 @@
 """``hexacell`` and ``python -m hexacell``."""
 
-from __future__ import annotations
-
 import sys
 import warnings
 

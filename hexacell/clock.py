@@ -4,8 +4,6 @@ In a real cell it runs in real time. In a simulated one it may run faster by the
 then windows, latencies and moves all become shorter by that factor and nothing else changes.
 """
 
-from __future__ import annotations
-
 import asyncio
 import threading
 import time

@@ -3,8 +3,6 @@
 They are SciPy's, which takes a fifth of a second to load: commands that test nothing do without.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

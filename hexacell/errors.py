@@ -1,7 +1,5 @@
 """The root of all errors, and the exit codes of every command."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterable, Sequence
 from enum import IntEnum

@@ -1,7 +1,5 @@
 """Plug-ins that packages announce as entry points: found by name, imported only when needed."""
 
-from __future__ import annotations
-
 import logging
 import sys
 from collections.abc import Callable, Sequence

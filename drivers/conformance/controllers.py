@@ -1,7 +1,5 @@
 """The tests that every controller's driver passes, against a twin of its controller and of a machine."""
 
-from __future__ import annotations
-
 import asyncio
 from abc import abstractmethod
 from typing import Protocol

@@ -1,7 +1,5 @@
 """The tests that every driver of encoders passes, against a twin of six encoders."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 from abc import abstractmethod

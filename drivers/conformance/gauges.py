@@ -1,7 +1,5 @@
 """The tests that every gauge's driver passes, against a twin of its instrument on a serial line."""
 
-from __future__ import annotations
-
 import asyncio
 from abc import abstractmethod
 from collections.abc import AsyncIterator

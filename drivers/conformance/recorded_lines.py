@@ -1,7 +1,5 @@
 """Lines that answer as a wire trace has it, and say where a driver asks something else."""
 
-from __future__ import annotations
-
 import re
 import select
 import threading

@@ -1,7 +1,5 @@
 """What all conformance suites have in common: a device against its twin, and what they ask of failures."""
 
-from __future__ import annotations
-
 import asyncio
 from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Awaitable, Callable

@@ -1,7 +1,5 @@
 """Simulated gauges on a pseudo-terminal and encoders on a bus or a line, as twins of conformance tests."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from drivers.simulated.cell import encoder_bank

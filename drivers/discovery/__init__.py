@@ -1,7 +1,5 @@
 """Finds devices whose addresses nobody knows: only questions are sent, and every wait is bounded."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -1,7 +1,5 @@
 """Whether a LinuxCNC answers: it is greeted, and nothing is switched or asked for."""
 
-from __future__ import annotations
-
 import asyncio
 from contextlib import suppress
 from dataclasses import dataclass

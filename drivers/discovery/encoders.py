@@ -6,8 +6,6 @@ configuration state take the same id. So the device must be alone on the bus, an
 before anything is set.
 """
 
-from __future__ import annotations
-
 import re
 import threading
 from collections.abc import Collection, Mapping

@@ -1,7 +1,5 @@
 """Which dial indicators answer on a serial port: each protocol is asked as its :class:`Probe` says."""
 
-from __future__ import annotations
-
 import asyncio
 import re
 import threading

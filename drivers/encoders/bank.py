@@ -1,7 +1,5 @@
 """What all encoder banks have in common: sessions on a thread, and plausible samples."""
 
-from __future__ import annotations
-
 import logging
 import threading
 import time

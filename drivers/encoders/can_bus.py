@@ -1,7 +1,5 @@
 """The CAN bus of the encoders: one receiving thread, and a time limit on every wait."""
 
-from __future__ import annotations
-
 import logging
 import threading
 import time

@@ -3,8 +3,6 @@
 The SDO client can be interrupted, and detects a second device under the same node id.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum

@@ -6,8 +6,6 @@ device that the cell was set up with; settings that differ from the file's defau
 perhaps on purpose.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from configparser import Error as SyntaxFault

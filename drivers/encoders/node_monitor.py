@@ -1,7 +1,5 @@
 """Monitoring of the nodes: boot-up, heartbeat, emergency messages (CiA 301), and alarm entries."""
 
-from __future__ import annotations
-
 import struct
 import time
 from collections.abc import Sequence

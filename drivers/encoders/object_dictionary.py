@@ -1,7 +1,5 @@
 """The object dictionary entries used by the driver (CiA 301 and CiA 406)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import IntEnum
 

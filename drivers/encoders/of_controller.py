@@ -10,8 +10,6 @@ the zero in its config. That the controller runs these zeros is not seen before 
 joints change by other amounts than the config does, and the records do not agree.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Protocol, runtime_checkable
 

@@ -5,8 +5,6 @@ and a heartbeat. Nothing is stored in the device: a power cycle restores its set
 read over SDO: some devices respond with an older sample.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

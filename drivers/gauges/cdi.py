@@ -6,8 +6,6 @@ and ``IN`` or ``MM``. ``?pXXX`` requests parameter XXX (Starrett IQ manual, page
 answer: the bare number and ``pXXX=number`` are both accepted. Older indicators only know ``R``.
 """
 
-from __future__ import annotations
-
 import re
 from enum import IntEnum
 from functools import partial

@@ -5,8 +5,6 @@ number is; ``stream`` has the pattern of lines that a gauge sends by itself, whe
 distinguishes several gauges on one port; ``modbus`` says in which registers a value stands.
 """
 
-from __future__ import annotations
-
 import re
 import struct
 from typing import ClassVar

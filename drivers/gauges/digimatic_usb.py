@@ -1,7 +1,5 @@
 """Digimatic indicators behind a microcontroller on USB."""
 
-from __future__ import annotations
-
 import re
 
 from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec

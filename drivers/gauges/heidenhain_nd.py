@@ -1,7 +1,5 @@
 """Length gauges behind a Heidenhain ND display unit."""
 
-from __future__ import annotations
-
 import re
 
 from drivers.errors import WrongSetting

@@ -1,7 +1,5 @@
 """Keyence GT2 probes behind a DL-RS1A."""
 
-from __future__ import annotations
-
 import re
 
 from drivers.errors import EmptyChannel

@@ -1,7 +1,5 @@
 """Mitutoyo ID-H indicators with RS-232C."""
 
-from __future__ import annotations
-
 import re
 
 from drivers.errors import WrongSetting

@@ -6,8 +6,6 @@ multiplexer is busy. The second is 1 in the sources seen; the channel is accepte
 unit: five decimals are inches. Hold, direction and preset cannot be asked for.
 """
 
-from __future__ import annotations
-
 import asyncio
 import re
 from contextlib import suppress

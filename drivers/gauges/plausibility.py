@@ -1,7 +1,5 @@
 """Whether a displayed value can be one of this gauge: its decimals, and its distance from the others."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from decimal import Decimal
 

@@ -1,7 +1,5 @@
 """Base class of all dial indicators on serial lines: opening, reading twice, checking settings."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 from abc import ABC, abstractmethod

@@ -4,8 +4,6 @@ A value that comes just after a move may have been measured before it: adapters,
 take time. So a frame counts only if its first byte came ``delay_s`` after the reading began, or later.
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from enum import Enum, auto
 from typing import ClassVar

@@ -7,8 +7,6 @@ its range (Sylvac opto-RS instructions; the answers to settings from the Z-Cal, 
 manuals). After switching on, the instrument sends its identification without a request.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Dial indicators with a Mitutoyo U-WAVE transmitter."""
 
-from __future__ import annotations
-
 import re
 
 from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, Probe, ProtocolSpec, Unit

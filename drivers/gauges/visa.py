@@ -5,8 +5,6 @@ the instrument must have. Numbers are those of SCPI-99, volume 1, 7.2.1: 9.9E37 
 no number.
 """
 
-from __future__ import annotations
-
 import re
 import termios
 from contextlib import suppress

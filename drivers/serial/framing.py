@@ -1,7 +1,5 @@
 """Frames among received bytes: of answers, and of a line that sends unasked."""
 
-from __future__ import annotations
-
 import re
 from collections import deque
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ pymodbus is imported when such a line is opened. A request is the device and the
 its checksum; an answer is the registers. No call takes longer than the time-out.
 """
 
-from __future__ import annotations
-
 import logging
 import struct
 import termios

@@ -3,8 +3,6 @@
 Names may change, adapters do not. What pyserial raises becomes an error with the next action.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import termios

@@ -5,8 +5,6 @@ frame has a byte with bit 7 set, so such bytes are what damage becomes: a termin
 damaged byte (PARMRK in termios(3)), and :class:`ParityInBit7` replaces it by ``FF``.
 """
 
-from __future__ import annotations
-
 import termios
 from collections.abc import Mapping
 from contextlib import suppress

@@ -4,8 +4,6 @@ No wait is longer than :data:`SLICE_S` without a check whether the port is to be
 opening of a network port, which pyserial limits to five seconds.
 """
 
-from __future__ import annotations
-
 import termios
 import threading
 import time

@@ -1,7 +1,5 @@
 """A line that is asked: what serial ports, and lines that another library opens, have in common."""
 
-from __future__ import annotations
-
 import threading
 from abc import ABC, abstractmethod
 from collections import deque

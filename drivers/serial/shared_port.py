@@ -1,7 +1,5 @@
 """Serial ports as coroutines: one worker thread a port, shared by the gauges on it."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Callable, Mapping
 from functools import partial

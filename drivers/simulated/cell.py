@@ -1,7 +1,5 @@
 """A complete simulated cell: gauges, encoders and controller, served over their own protocols."""
 
-from __future__ import annotations
-
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path

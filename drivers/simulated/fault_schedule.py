@@ -1,7 +1,5 @@
 """Faults of a simulated cell, injected at once or on schedule."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial

@@ -1,7 +1,5 @@
 """A cell with a real controller: the robot that it moves, and its gauges and encoders, are simulated."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import threading

@@ -5,8 +5,6 @@ pose under the true geometry is computed by continuation, so that the assembly m
 encoders add noise.
 """
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -6,8 +6,6 @@ what ``serial.serial_for_url`` opens, the same after unplugging and plugging in 
 how many clients have connected; 0 where a connection cannot be noticed.
 """
 
-from __future__ import annotations
-
 import fcntl
 import os
 import re

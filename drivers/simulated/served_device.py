@@ -1,7 +1,5 @@
 """What simulated devices have in common: they serve until closed, and their faults are switched."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from contextlib import ExitStack
 from typing import Protocol, Self

@@ -5,8 +5,6 @@ answered with CR, or BEL for an error; frames are ``t`` (11-bit id), ``T`` (29-b
 ``R`` for remote requests: id in hexadecimal, number of bytes, bytes.
 """
 
-from __future__ import annotations
-
 import re
 import select
 import threading

@@ -6,8 +6,6 @@ Documentation/hwmon/sysfs-interface.rst) and ``temperature`` of a DS18B20 below
 which takes up to 750 ms; the file is empty during another measurement.
 """
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import os

@@ -1,7 +1,5 @@
 """The state of a campaign of measurements, and the decisions that are made on it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import hypot

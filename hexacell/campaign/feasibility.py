@@ -1,7 +1,5 @@
 """Whether a plan can work at all: what its points and limits make impossible, before anything moves."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations, pairwise

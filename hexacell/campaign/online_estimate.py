@@ -10,8 +10,6 @@ geometries within the tolerances. A search that explains nothing is remembered: 
 there is more to explain or more to explain it by, twice the cost, or half as many records again.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Protocol

@@ -11,8 +11,6 @@ Estimates while measuring use pilot records as others. The identification uses n
 from before the noise is measured, and from before it is decided of how many windows a record is the mean.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from hexacell.cell.measuring import MOST_POSES

@@ -1,7 +1,5 @@
 """The pose to measure next at a point, and the path to it: selected, or the next safe one of a list."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass

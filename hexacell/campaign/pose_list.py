@@ -6,8 +6,6 @@ other rows are visited in their order. A pose at which the ball may leave the tr
 so far is postponed until more is known.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

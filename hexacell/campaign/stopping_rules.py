@@ -1,7 +1,5 @@
 """When a campaign ends, and when it leaves a point: budget, accuracy reached, another point worth more."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Protocol
 

@@ -1,7 +1,5 @@
 """The cells that come with the package, wherever it is installed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from hexacell.errors import UsageError, did_you_mean

@@ -5,8 +5,6 @@ A field whose alias ends in the unit of the joint variables is in that unit: ``e
 here they are derived for deg, with other keys and defaults, and nothing else changes.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from copy import copy

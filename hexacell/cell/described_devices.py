@@ -1,7 +1,5 @@
 """Sections of the cell file that describe what a device sends, where no driver knows it."""
 
-from __future__ import annotations
-
 import re
 from typing import Annotated, Any, Literal, Self
 

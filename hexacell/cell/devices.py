@@ -1,7 +1,5 @@
 """Sections of the cell file: the devices and their addresses."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, Self

@@ -4,8 +4,6 @@ The model refuses a file with pydantic's errors, which name types and validators
 sentence: what is in the file, what must be there, and what to do.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Types that the sections of the cell file share, with each other and with the records of a run."""
 
-from __future__ import annotations
-
 from datetime import date, datetime
 from typing import Annotated, Any, TypeVar
 

@@ -1,7 +1,5 @@
 """Section of the cell file on the limits of motion: of commands, joint variables, joints and legs."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator

@@ -4,8 +4,6 @@ The content that :mod:`hexacell.cell.model` describes becomes settings here, wit
 and errors that a technician can act on.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

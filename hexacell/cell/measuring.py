@@ -1,7 +1,5 @@
 """Sections of the cell file on measuring: where and how, within which limits, and when it is accepted."""
 
-from __future__ import annotations
-
 from typing import Literal, Self
 
 from pydantic import field_validator, model_validator

@@ -1,7 +1,5 @@
 """The cell file as a whole, the rules that span its sections, and the keys that the mechanism decides."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from datetime import date
 from typing import Literal, Self, TypeVar

@@ -4,8 +4,6 @@ A cell file is copied, shown and kept with every run, so a password should not b
 that has one counts.
 """
 
-from __future__ import annotations
-
 import os
 import stat
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """The section of the cell file on the handling of failures."""
 
-from __future__ import annotations
-
 from enum import StrEnum
 from typing import Literal, Self
 

@@ -1,7 +1,5 @@
 """The section of a simulated cell: its true geometry, motion, noise and faults."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from hexacell.cell.fields import (

@@ -1,7 +1,5 @@
 """Sections of what records hardly show: sizes of effects, and the length check of encoders."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self, get_args
 

@@ -4,8 +4,6 @@ It is no verdict: a robot may have changed and still be within its limit, and mo
 single parameter are seen later. It says early that something happened, and probably to which leg.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial

@@ -5,8 +5,6 @@ since; without such a result from the drawing. Poses are chosen for the error at
 ends as soon as that error and its uncertainty decide against the limit, or its budget is used.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

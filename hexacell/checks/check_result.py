@@ -1,7 +1,5 @@
 """The result of a check: the error of the controller's geometry now, what has changed, and the verdict."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from datetime import datetime
 

@@ -5,8 +5,6 @@ It starts from the last accepted result and from what may have drifted since, as
 the worst task pose is that of the last calibration, or its budget is used. Its result is a whole geometry.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """Entry of the command line: runs a command and turns every error into a message and an exit code."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import shlex

@@ -1,7 +1,5 @@
 """The cell file or the archive that a command is given; warnings about the cell go to stderr."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from hexacell.cell.loader import Cell, load_cell

@@ -1,7 +1,5 @@
 """Output of a command: text on stdout, or on stderr where stdout carries a JSON document."""
 
-from __future__ import annotations
-
 import json
 import os
 import sys

@@ -4,8 +4,6 @@ It stands beside the journal of a run and replaces no part of it. Every package 
 modules: ``hexacell``, ``procedures`` and ``drivers`` with ``drivers.wire``, the bytes on the lines.
 """
 
-from __future__ import annotations
-
 import logging
 import time
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Arguments of all commands. Only the standard library is imported, so that ``--help`` is instant."""
 
-from __future__ import annotations
-
 import argparse
 
 from hexacell import __version__

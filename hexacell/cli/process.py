@@ -4,8 +4,6 @@ SIGTERM and SIGHUP do what Ctrl-C does. ``docs/howto-host.md`` says what is test
 slow is imported.
 """
 
-from __future__ import annotations
-
 import os
 import platform
 import shlex

@@ -1,7 +1,5 @@
 """Progress of a run at a terminal: a bar, a line for each set, and answers to what a person asks."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import sys

@@ -3,8 +3,6 @@
 Signals become commands to the engine, never an exception in the middle of a step.
 """
 
-from __future__ import annotations
-
 import asyncio
 import signal
 import sys

@@ -1,7 +1,5 @@
 """A run that nobody watches: begun within its window, and people are notified afterwards."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Callable
 

@@ -12,8 +12,6 @@ Which key holds which number follows from patterns in the cell file, one for eac
 both numbers, and only the correction is written: the nominal number stays as it is.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import ceil, log10

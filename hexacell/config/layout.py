@@ -4,8 +4,6 @@ Most controllers have it in one file. Of LinuxCNC's ``genhexkins`` base and plat
 and the zeros of the legs in the INI file. Each parameter is looked for in every file and must be in one.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -5,8 +5,6 @@
 Where the value is a variable of the INI file (``[GENHEXKINS]BASE0X``), that is the config.
 """
 
-from __future__ import annotations
-
 import re
 from collections import defaultdict
 from collections.abc import Mapping

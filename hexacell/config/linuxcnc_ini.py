@@ -14,8 +14,6 @@ of a line, even of a comment, makes the next one a part of it (seen with ``iniva
 LinuxCNC would not see, or see otherwise than a person, is refused.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ read back. If the process is killed in between, the next one that holds the cell
 the old content or, where all files are new already, only removes the note.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress

@@ -14,8 +14,6 @@ The file belongs to the robot's owner. A write-back changes the numbers of the g
 character.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -6,8 +6,6 @@ record that cannot be written undoes nothing. Each line is on the disk before th
 begins on a line of its own: what a power cut or a full disk tears costs no other.
 """
 
-from __future__ import annotations
-
 import os
 import socket
 import stat

@@ -1,7 +1,5 @@
 """A robot of the mechanism under test, and poses in which it is tested."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Whether the frame convention of a mechanism removes exactly what the choice of frames explains."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

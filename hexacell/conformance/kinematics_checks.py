@@ -1,7 +1,5 @@
 """Whether constraints, derivatives, inverse and forward kinematics of a mechanism agree."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import ClassVar
 

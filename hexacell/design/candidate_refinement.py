@@ -7,8 +7,6 @@ those and what they were turned to the best go on, so that no gain is lost (a ra
 successive halving; Spall, Introduction to Stochastic Search and Optimization, 2003).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache

@@ -1,7 +1,5 @@
 """Candidate poses, poses that span the workspace, and the commands that bring the robot to them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache

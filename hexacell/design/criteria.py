@@ -11,8 +11,6 @@ those taken (Fedorov, Theory of Optimal Experiments, 1972; Atkinson & Donev, Opt
 - I: the mean variance of the position at the task poses, ``tr(J C J^T)``.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

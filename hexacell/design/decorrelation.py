@@ -4,8 +4,6 @@ One more record is tried at each point measured so far: the level platform tilte
 about z. The covariance after it is predicted as in :mod:`hexacell.design.criteria`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 

@@ -14,8 +14,6 @@ Of the few examined together a straight path is preferred to one over waypoints,
 unless the gain makes up for them; a path over the reference is the last choice.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 Both are propagated linearly with their covariances.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

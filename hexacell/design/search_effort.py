@@ -1,7 +1,5 @@
 """How much work is put into the search for poses and into trying a plan out before anything moves."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from hexacell.design.candidate_refinement import QUICK, THOROUGH, Rounds

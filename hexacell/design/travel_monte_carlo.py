@@ -21,8 +21,6 @@ variates. How cautious the evaluation is depends on the standard deviation s of 
 The constants were chosen so that of 1,000 simulated robots none left the travel.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 

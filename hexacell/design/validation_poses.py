@@ -5,8 +5,6 @@ it fits in any case: a greedy maximin (space-filling) design (Johnson, Moore & Y
 and Inference 26, 1990).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hexacell.design.candidates import ReachableTargets, reachable_targets

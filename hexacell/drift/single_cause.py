@@ -17,8 +17,6 @@ its parameters, each of which may have changed by an amount with the standard de
 (Kass and Raftery, Bayes factors, Journal of the American Statistical Association 90, 1995, 773-795).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A plan carried out on virtual robots, decision by decision, and what it gives: before anything moves."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from statistics import median
 

@@ -1,7 +1,5 @@
 """A quick level carried out on a virtual robot that drifted as stated, before anything moves."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

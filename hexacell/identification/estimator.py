@@ -1,7 +1,5 @@
 """The identification of a geometry from records: with screening of the data, or online while measuring."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

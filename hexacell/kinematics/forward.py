@@ -21,8 +21,6 @@ Allgower and Georg, Numerical Continuation Methods, 1990;
 Deuflhard, Newton Methods for Nonlinear Problems, 2004, sec. 5.1 (contraction along a homotopy).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

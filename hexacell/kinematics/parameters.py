@@ -4,8 +4,6 @@ A mechanism describes its parameters once, as a :class:`ParameterSet`. Vectors, 
 prior and the frame convention are derived from that description.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum

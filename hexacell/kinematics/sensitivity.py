@@ -22,8 +22,6 @@ Only poses between these bounds need the decomposition. Source: Golub and Van Lo
 4th ed. 2013 (norms, singular values).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -5,8 +5,6 @@ commanded, mm and deg, the joint variables by the encoders, mm or deg as the mec
 deviation from the point's first row, mm. The order of the columns is free, and other columns are ignored.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import math

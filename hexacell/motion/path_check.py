@@ -7,8 +7,6 @@ and the ball's distance from the reference is computed from its path. Whether a 
 is the same question without a line.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

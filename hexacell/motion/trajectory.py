@@ -14,8 +14,6 @@ A move must last so long that nothing on its way is faster than allowed. A contr
 them. A feed rate would not do: it counts X, Y and Z only, so a platform that tilts about the ball has none.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

@@ -10,8 +10,6 @@ gauges exchanged and one of them reversed: two mistakes at once must be followed
 more, where 3 is the most.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property

@@ -1,7 +1,5 @@
 """The noise that a run has measured at its start, and what follows from it for everything after."""
 
-from __future__ import annotations
-
 from hexacell.campaign.budget import TimeModel
 from hexacell.cell.fields import Frozen, Point, SixNumbers
 from hexacell.cell.model import CellSettings

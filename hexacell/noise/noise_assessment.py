@@ -6,8 +6,6 @@ Where the cell file allows it, less than stated counts as well, by the upper lim
 show. The mean of more readings is better in the part from reading to reading, and in no other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Runs that have ended as results for other machines, in the words of OPC 40001-101 (Result Transfer)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

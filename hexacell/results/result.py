@@ -3,8 +3,6 @@
 The acceptance gates and the write-back are derived from it without further computation.
 """
 
-from __future__ import annotations
-
 from datetime import datetime
 from typing import Any, Self
 

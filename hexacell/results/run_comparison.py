@@ -4,8 +4,6 @@ The sigmas are those of the noise of the records. Effects that no record shows a
 runs of a machine and take no part in a difference.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime

@@ -1,7 +1,5 @@
 """Which limits a pose would break if the controller were commanded to it, in words."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The limits of motion and the systematic effects that a cell file states, as the mathematics has them."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,7 +1,5 @@
 """Virtual robots: geometries drawn within the tolerances, moved by the real controller's geometry."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Who is connected to a run: all receive everything, and one of them gives the commands."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import pwd

@@ -1,7 +1,5 @@
 """A connection to a run, in another process or recorded, and how such a process is started."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import sys

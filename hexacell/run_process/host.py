@@ -5,8 +5,6 @@ in progress and goes on when somebody who has attached says so. Where nobody doe
 cell file states, it ends in place and can be resumed.
 """
 
-from __future__ import annotations
-
 import asyncio
 from socket import socket
 

@@ -1,7 +1,5 @@
 """What the devices show now: while no run has them, and while a run reads them or waits for a person."""
 
-from __future__ import annotations
-
 import asyncio
 import math
 from collections import deque

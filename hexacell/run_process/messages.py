@@ -6,8 +6,6 @@ received before it does not count. So a recorded run goes back in time. Snapshot
 screens, never for records.
 """
 
-from __future__ import annotations
-
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args

@@ -1,7 +1,5 @@
 """A recorded run, watched again: a connection with a cursor in time."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import AsyncIterator, Sequence
 

@@ -5,8 +5,6 @@ there is none. Its name follows from the controller's config, as that of the cel
 for the same robot find the same run.
 """
 
-from __future__ import annotations
-
 import fcntl
 import hashlib
 import os

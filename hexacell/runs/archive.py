@@ -5,8 +5,6 @@ its folder then (:mod:`~hexacell.runs.archived_documents`); where the folder has
 document counts for nothing. So it may be deleted at any time; a damaged file is replaced.
 """
 
-from __future__ import annotations
-
 import os
 import socket
 import sqlite3

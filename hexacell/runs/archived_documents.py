@@ -1,7 +1,5 @@
 """What an archive keeps: documents derived from run folders, each with the stamp of its folder."""
 
-from __future__ import annotations
-
 import os
 from contextlib import suppress
 from dataclasses import dataclass

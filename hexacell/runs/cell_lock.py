@@ -20,8 +20,6 @@ Only the user who made the file may write it, whatever the umask is. All others 
 is enough to lock it; they cannot leave their name in it, so a name counts only while its process lives.
 """
 
-from __future__ import annotations
-
 import fcntl
 import getpass
 import json

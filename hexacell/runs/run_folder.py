@@ -1,7 +1,5 @@
 """Run folders: where every run of a cell is kept, what is in one, and why a run could not begin."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import re

@@ -1,7 +1,5 @@
 """Long computations in a process of their own: keys are heard meanwhile, and quitting ends it at once."""
 
-from __future__ import annotations
-
 import asyncio
 import sys
 from asyncio.subprocess import DEVNULL, PIPE

@@ -1,7 +1,5 @@
 """The model behind the screens: a cell, the run in it, and what a person may ask for."""
 
-from __future__ import annotations
-
 import asyncio
 import time
 from collections.abc import Awaitable, Callable

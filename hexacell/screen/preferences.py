@@ -1,7 +1,5 @@
 """The keys and the colours of the screens, and the file in which a person may choose others."""
 
-from __future__ import annotations
-
 import os
 import tomllib
 from collections import Counter

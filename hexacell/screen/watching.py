@@ -1,7 +1,5 @@
 """What a screen follows: one run at a time, and the devices while no run has them."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager

@@ -1,7 +1,5 @@
 """The cell behind a screen: its file, devices, preflight, plan, runs and config."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import AsyncIterator
 from pathlib import Path

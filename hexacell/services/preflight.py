@@ -1,7 +1,5 @@
 """Before a run: exclusions written into the cell file, one at a time, and warnings about the cell."""
 
-from __future__ import annotations
-
 import ipaddress
 import struct
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """The effort of every search that this program makes; tests of whole runs replace it by a smaller one."""
 
-from __future__ import annotations
-
 from hexacell.design.search_effort import USUAL_EFFORT, SearchEffort
 
 EFFORT: SearchEffort = USUAL_EFFORT

@@ -8,8 +8,6 @@ the new one, never a mixture. A process that dies in between leaves its temporar
 What cannot be read or written is a ``FileError`` with the reason and what to do.
 """
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import os

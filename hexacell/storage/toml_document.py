@@ -9,8 +9,6 @@ Secret is the text behind a key whose name ends with ``password``, ``secret``, `
 in a comment, and the password in an address such as ``http://user:password@host``.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import tomllib

@@ -4,8 +4,6 @@ Its scheduler gives the tasks of a lost worker to other workers. What it gives u
 when the scheduler itself is lost, breaks the executor, and the study does it again with the next one.
 """
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import re

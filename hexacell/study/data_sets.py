@@ -4,8 +4,6 @@ Nothing here uses the derivatives that the estimator works with: poses are found
 deviations are differences of positions.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ It minimises the plain sum of squares of all pairwise differences, eq. 5-8:
 ``E = (P_r - d_r) - (P_n - d_n)`` for every two records r, n of a point. No weights, no prior.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator
 

@@ -4,8 +4,6 @@ Each task has its own seed, so it does not matter who does it. Where a worker di
 had begun is done again; only a task that has ended its worker several times is given up.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 from collections.abc import Callable, Collection, Iterator, Mapping

@@ -3,8 +3,6 @@
 The metrics are in the text format of Prometheus, for the textfile collector of its node exporter.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from textwrap import indent
 from typing import Any

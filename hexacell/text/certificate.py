@@ -3,8 +3,6 @@
 Sources: the schemas https://ptb.de/dcc/v3.3.0/dcc.xsd and https://ptb.de/si/v2.2.1/SI_Format.xsd.
 """
 
-from __future__ import annotations
-
 import re
 from xml.etree.ElementTree import fromstring, indent, register_namespace, tostring
 

@@ -1,7 +1,5 @@
 """Devices that were found, in words and as text for a cell file; and one that was watched."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from typing import Any

@@ -1,7 +1,5 @@
 """Text for an identification: the findings first, then accuracy, parameters and checks of the model."""
 
-from __future__ import annotations
-
 from hexacell.identification.diagnostics.model_tests import contradicted_points
 from hexacell.identification.identified_zeros import IdentifiedZeros
 from hexacell.identification.solver.result import Identification

@@ -1,7 +1,5 @@
 """Text for the noise that a run measured at its start: what it is, what is wrong, and what to do."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 from hexacell.kinematics.parameters import JointUnit

@@ -1,7 +1,5 @@
 """The paper's simulations and experiment as text, documents and pictures, beside what the paper says."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from math import isfinite

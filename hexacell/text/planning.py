@@ -1,7 +1,5 @@
 """Text for plans: what to measure next, what records gain, what a dry run of each mode predicts."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path

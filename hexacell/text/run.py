@@ -1,7 +1,5 @@
 """Text for a run as a whole: how it begins, what it asks, how to resume it, its end, and its replay."""
 
-from __future__ import annotations
-
 import shlex
 from pathlib import Path
 

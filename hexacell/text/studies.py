@@ -3,8 +3,6 @@
 A new study is one more row at the end, and one of the command's arguments.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from math import isfinite

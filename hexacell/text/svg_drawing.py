@@ -1,7 +1,5 @@
 """Drawings as SVG text that is the same, byte for byte, whenever it is drawn."""
 
-from __future__ import annotations
-
 import io
 import re
 from typing import Any

@@ -1,7 +1,5 @@
 """Words for what is decided: verdict, errors with U, evidence, length scale, what must be taught anew."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 

@@ -6,8 +6,6 @@ measuring changes every length of a part by its coefficient of expansion, and th
 the base.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial

@@ -6,8 +6,6 @@ first order. An error ``df`` of the constraints, which is in mm of leg length, m
 ``-J^-1 df`` (:mod:`hexacell.kinematics.sensitivity`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import Enum

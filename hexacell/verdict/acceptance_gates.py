@@ -1,7 +1,5 @@
 """Gates that an identified geometry must pass before it is written to a controller."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from hexacell.cell.fields import Frozen

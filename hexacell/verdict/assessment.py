@@ -1,7 +1,5 @@
 """The assessment of an identification: can it be trusted, and how accurate is the robot with it?"""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from itertools import chain, repeat
 

@@ -1,7 +1,5 @@
 """The meaning of an identification and its assessment, in sentences for people; the most serious first."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from hexacell.identification.diagnostics.model_tests import contradicted_points

@@ -1,7 +1,5 @@
 """The JSON document of an identification and of the checks of it (``fit --json``)."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A length check: the scale of all encoders from two seats, whether its records hold, and the verdict."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 

@@ -6,8 +6,6 @@ confirmed, as that of an experiment is, by new records alone: at poses that are 
 from all other records. What made a test fail narrowly is in these too, and is found by a test at 1 %.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

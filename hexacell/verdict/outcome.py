@@ -1,7 +1,5 @@
 """The outcome of a calibration, a check or a length check in one line, for the journal and for people."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from hexacell.identification.identified_zeros import ParameterChoice

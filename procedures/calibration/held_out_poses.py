@@ -6,8 +6,6 @@ robot's limits, since a geometry may be right at small tilts alone. Where a test
 narrowly, confirming ones follow, at the same points.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 

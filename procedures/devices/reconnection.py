@@ -1,7 +1,5 @@
 """Reopening devices that were lost: the same ones, or none."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 

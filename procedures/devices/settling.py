@@ -1,7 +1,5 @@
 """Settled readings: readings are taken until a whole window of them agrees."""
 
-from __future__ import annotations
-
 from collections import deque
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 The flags that the commands set decide the status of the engine.
 """
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """How people steer a running engine: commands with their queue, and answers to its questions."""
 
-from __future__ import annotations
-
 import asyncio
 from collections import deque
 from collections.abc import Callable, Iterator

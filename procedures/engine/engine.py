@@ -1,7 +1,5 @@
 """The engine of a run: decide on a step, journal it, execute it, journal its event; until none is left."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Callable, Sequence
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Polling of the supervised devices: their latest answers, from which the rules are evaluated."""
 
-from __future__ import annotations
-
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar

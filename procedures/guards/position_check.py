@@ -18,8 +18,6 @@ A pose that the encoders still agree with, but the joint variables do not, is th
 differs a little: one that was edited, or not read again.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import StrEnum
 

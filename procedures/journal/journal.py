@@ -10,8 +10,6 @@ confirmed. Anything else that is wrong is damage and refused with its line. One 
 at a time.
 """
 
-from __future__ import annotations
-
 import fcntl
 import gc
 import logging

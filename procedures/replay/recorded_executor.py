@@ -3,8 +3,6 @@
 No robot moves, so there is nothing to supervise: the guards of a replay only evaluate numbers.
 """
 
-from __future__ import annotations
-
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from functools import cached_property

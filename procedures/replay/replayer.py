@@ -5,8 +5,6 @@ A step states which events are its outcomes; all other events have external caus
 policy) and are taken from the journal.
 """
 
-from __future__ import annotations
-
 import asyncio
 import math
 from collections.abc import Awaitable, Iterator, Mapping, Sequence

@@ -17,8 +17,6 @@ The records of a run are commanded with the geometry of its config. The file mus
 the run began with, or the one that the run itself wrote and has not reverted.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress

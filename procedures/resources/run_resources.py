@@ -1,7 +1,5 @@
 """What a step uses to do its work: the devices under guards, the clock, the operator, the run folder."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property

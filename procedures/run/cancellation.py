@@ -3,8 +3,6 @@
 The caller's ``asyncio.CancelledError`` is raised when they have ended.
 """
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Callable, Coroutine
 from typing import Any, ParamSpec, TypeVar

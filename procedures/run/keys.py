@@ -1,7 +1,5 @@
 """Where something is measured, and what for: phases, and the keys of sets."""
 
-from __future__ import annotations
-
 from enum import StrEnum
 
 from hexacell.campaign.pilots import pilot_number

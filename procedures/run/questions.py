@@ -1,7 +1,5 @@
 """Questions that a run asks a person, as plain data for any user interface."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol

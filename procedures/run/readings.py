@@ -1,7 +1,5 @@
 """What the instruments read, raw, and the temperatures of the legs by it; nothing depends on a geometry."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Accept: a person decides whether a written geometry that did not pass stays."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """Assess noise: what was read at the first reference gives the noise that the run counts with."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

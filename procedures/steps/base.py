@@ -4,8 +4,6 @@ Both are data: a step is journalled when it is decided, its event when it has be
 the kind of each are part of the journal.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from dataclasses import replace
 from typing import ClassVar

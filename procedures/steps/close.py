@@ -1,7 +1,5 @@
 """Close: the reference of a set is read again at its end; the difference is drift."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """Commit: the proposed geometry is written to the controller, once it is approved."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

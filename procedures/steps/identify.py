@@ -1,7 +1,5 @@
 """Identify: the geometry is identified from the records, and the held-out poses are chosen."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """Judge: the verdict of a run, or the confirming records that it needs first."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from statistics import fmean

@@ -1,7 +1,5 @@
 """Lend: the controller commands with a provisional geometry while the remaining points are measured."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

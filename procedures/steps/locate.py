@@ -1,7 +1,5 @@
 """Locate: where the robot is, after that had been unknown."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """Move: the robot goes to a pose, unless the controller refuses it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

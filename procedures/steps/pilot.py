@@ -1,7 +1,5 @@
 """Pilot: the gauges are read where the reference was left, which steers the choice of poses."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

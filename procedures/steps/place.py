@@ -1,7 +1,5 @@
 """Place: the gauges are put around the ball, by a person unless they are fixed."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

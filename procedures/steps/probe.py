@@ -1,7 +1,5 @@
 """Probe: the gauges are read beside a set's reference, after a small known move of the ball."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

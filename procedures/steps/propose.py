@@ -1,7 +1,5 @@
 """Propose: the new config is prepared in the run folder, and the gates for writing it are evaluated."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

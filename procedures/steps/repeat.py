@@ -1,7 +1,5 @@
 """Repeat: a set's reference is read again from another direction, which shows how well it repeats."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """Revisit: back at a set's reference after an interruption, the set goes on or is measured again."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """Roll back: the controller gets the config that it had before the run, bit for bit."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """Sample: a record is taken, or rejected because the ball left the gauges' travel."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

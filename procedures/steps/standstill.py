@@ -1,7 +1,5 @@
 """Standstill: all devices are read again and again while nothing moves, which shows their noise."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """Take back: the controller gets its own geometry again after the provisional one."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """Try: back at a set's reference it is judged whether each gauge followed the ball."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import ClassVar, Literal

@@ -4,8 +4,6 @@ The poses are chosen in :mod:`~procedures.calibration.held_out_poses`. Those tha
 measured again afterwards, for the comparison.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from hexacell.errors import LimitError

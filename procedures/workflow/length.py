@@ -6,8 +6,6 @@ mounting. From the second one on they are mounted while the ball is beside the m
 somebody zeroes out of habit do not show the same as before.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,8 +6,6 @@ the held-out points are measured again. A check only measures points. A length c
 the verdict on a calibration, measures two seats (:mod:`~procedures.workflow.length`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from hexacell.campaign.planner import Plan

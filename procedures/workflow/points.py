@@ -5,8 +5,6 @@ of the robot it leaves for pilot poses, which steer the choice of the others
 (:mod:`hexacell.campaign.pilots`), and else for level ones beside the reference.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Everything that must hold before motion, checked at once; nothing moves."""
 
-from __future__ import annotations
-
 from collections.abc import Awaitable, Iterator
 from pathlib import Path
 

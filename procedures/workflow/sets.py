@@ -1,7 +1,5 @@
 """The steps within a set of poses and the moves between them: along checked straight lines, or none."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property

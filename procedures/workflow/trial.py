@@ -6,8 +6,6 @@ and scale (:mod:`hexacell.noise.gauge_trial`). Where they seem not to, the moves
 each time as long as the gauges' travel allows. Only then is anything else measured.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product

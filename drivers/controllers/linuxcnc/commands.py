@@ -1,7 +1,5 @@
 """The get and set commands of linuxcncrsh as typed calls; errors carry the controller's own messages."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable

@@ -1,7 +1,5 @@
 """One connection to linuxcncrsh: greeting, then one command and one response at a time."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import os

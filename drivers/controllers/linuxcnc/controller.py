@@ -1,7 +1,5 @@
 """A LinuxCNC machine, driven through its network shell linuxcncrsh."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress

@@ -7,8 +7,6 @@ adds a blank line after some refusals; 2.10 ends all with CR LF and explains a r
 ``error: ...`` lines before the NAK. (linuxcncrsh(1), and a wire trace of 2.9.)
 """
 
-from __future__ import annotations
-
 import asyncio
 import math
 import re

@@ -12,8 +12,6 @@ beside it, the screen is therefore ended: AXIS as LinuxCNC itself does it, any o
 LinuxCNC may show a window with its messages. It needs a ``DISPLAY`` to come back on.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import shlex

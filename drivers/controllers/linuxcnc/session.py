@@ -17,8 +17,6 @@ Locks, outermost first: the order lock of the controller (one order at a time), 
 status connection (one status query at a time), the two locks of the arbiter.
 """
 
-from __future__ import annotations
-
 import asyncio
 import logging
 from collections.abc import AsyncIterator

@@ -12,8 +12,6 @@ The forward kinematics must then find a pose at the joints where they stand. If 
 says that it does not, the old values are set again and the command fails.
 """
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -4,8 +4,6 @@ An acknowledgement means only that a command arrived: ``set machine on`` in emer
 ``set mode mdi`` before homing are both acknowledged and both do nothing.
 """
 
-from __future__ import annotations
-
 import asyncio
 import os
 import sys

@@ -1,7 +1,5 @@
 """The simulated encoders on a virtual CAN bus: CANopen nodes, and those that a DBC file describes."""
 
-from __future__ import annotations
-
 import uuid
 from collections.abc import Callable, Sequence
 from functools import partial

@@ -1,7 +1,5 @@
 """Simulated encoders with Modbus RTU: counts in the registers of one device or of several, on one line."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ Added are boot-up, NMT gating, TPDOs with SYNC and on event timers, emergencies,
 CiA 301 for changing PDOs.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable, Iterator
 from functools import partial

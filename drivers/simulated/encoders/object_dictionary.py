@@ -1,7 +1,5 @@
 """The object dictionary of a simulated encoder, built from a table, and what differs between vendors."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import chain

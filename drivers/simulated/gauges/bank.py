@@ -1,7 +1,5 @@
 """The simulated gauges of a cell: one line for each gauge, or for all gauges of a multiplexer."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial

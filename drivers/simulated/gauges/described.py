@@ -1,7 +1,5 @@
 """Simulated gauges that the cell file describes: frames like their example, SCPI, Modbus RTU."""
 
-from __future__ import annotations
-
 import re
 import struct
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Simulated indicators, multiplexers and display units; drivers send them nothing but questions."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import ClassVar
 

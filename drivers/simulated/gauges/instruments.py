@@ -3,8 +3,6 @@
 An instrument is announced in the entry point group ``hexacell.simulated_gauges``, under its protocol.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from math import copysign
 from typing import ClassVar

@@ -1,7 +1,5 @@
 """The server of one simulated gauge line, with the timing of a real one."""
 
-from __future__ import annotations
-
 import logging
 import os
 import queue

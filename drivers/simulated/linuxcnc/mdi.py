@@ -1,7 +1,5 @@
 """Parsing of one MDI block: rapid moves, moves at a feed or of a duration, LinuxCNC's error messages."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence

@@ -4,8 +4,6 @@ Responses to ``get`` end with CR LF, responses to ``set`` with LF CR, a refused 
 after the greeting, input is echoed unchanged. (Traces of LinuxCNC 2.9.)
 """
 
-from __future__ import annotations
-
 import re
 import socket
 import socketserver

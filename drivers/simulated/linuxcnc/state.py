@@ -4,8 +4,6 @@ Names and messages are LinuxCNC's: task state, mode, teleoperation, and a queue 
 All commands but MDI blocks are acknowledged even without effect.
 """
 
-from __future__ import annotations
-
 import threading
 from collections import deque
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """What the arguments of all commands are made of."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Arguments of the commands around unattended runs, for cell files, and for results and their history."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

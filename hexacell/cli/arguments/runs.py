@@ -1,7 +1,5 @@
 """Arguments of the commands that measure, show a run, or work on records, and of the studies."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

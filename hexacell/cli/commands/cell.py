@@ -1,7 +1,5 @@
 """``hexacell cell validate|schema|show``: checks or prints a cell file."""
 
-from __future__ import annotations
-
 import argparse
 import json
 

@@ -4,8 +4,6 @@ It is made of the program's own parser by shtab, so that it has whatever the ins
 shell runs it, and never the program.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator
 

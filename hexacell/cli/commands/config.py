@@ -1,7 +1,5 @@
 """``hexacell apply`` and ``rollback``: a proposal written into the controller's config, and undone."""
 
-from __future__ import annotations
-
 import argparse
 import asyncio
 from collections.abc import Iterator

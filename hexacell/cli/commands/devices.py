@@ -1,7 +1,5 @@
 """``hexacell devices``: what is connected, as text for a cell file; and one device watched for a while."""
 
-from __future__ import annotations
-
 import argparse
 import asyncio
 import sys

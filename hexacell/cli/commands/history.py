@@ -1,7 +1,5 @@
 """``hexacell history``: the runs of a cell, two of them compared, what drifts, and writes of its config."""
 
-from __future__ import annotations
-
 import argparse
 
 from hexacell.cell.loader import Cell

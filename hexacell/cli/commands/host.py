@@ -1,7 +1,5 @@
 """``hexacell host``: the process of a run that screens connect to and leave; started by the program."""
 
-from __future__ import annotations
-
 import argparse
 import asyncio
 import os

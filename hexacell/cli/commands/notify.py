@@ -1,7 +1,5 @@
 """``hexacell notify``: who is notified of unattended runs, whether that works, and what waits."""
 
-from __future__ import annotations
-
 import argparse
 
 from hexacell.cli.cell_argument import cell_at

@@ -1,7 +1,5 @@
 """``hexacell preflight``: checks everything that must hold before motion."""
 
-from __future__ import annotations
-
 import argparse
 import asyncio
 

@@ -1,7 +1,5 @@
 """``hexacell fit`` and ``hexacell next``: what the records in a measurement file say."""
 
-from __future__ import annotations
-
 import argparse
 
 from hexacell.cli.cell_argument import cell_at

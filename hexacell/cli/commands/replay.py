@@ -1,7 +1,5 @@
 """``hexacell replay``: puts a recorded run through the real procedure."""
 
-from __future__ import annotations
-
 import argparse
 import asyncio
 

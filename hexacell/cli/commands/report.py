@@ -1,7 +1,5 @@
 """``hexacell report``: a run as a page that can be filed."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

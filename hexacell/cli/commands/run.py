@@ -1,7 +1,5 @@
 """``hexacell run`` and ``hexacell demo``: the whole job, with progress, signals, keys and its outcome."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """``hexacell schedule``: a cell is checked or recalibrated each day, by systemd or cron."""
 
-from __future__ import annotations
-
 import argparse
 
 from hexacell.cell.loader import Cell

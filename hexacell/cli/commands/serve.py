@@ -1,7 +1,5 @@
 """``hexacell serve``: the results of a cell for other machines, by OPC UA."""
 
-from __future__ import annotations
-
 import argparse
 import asyncio
 import signal

@@ -1,7 +1,5 @@
 """``hexacell simulate``: serves a simulated cell to other processes."""
 
-from __future__ import annotations
-
 import argparse
 import signal
 import sys

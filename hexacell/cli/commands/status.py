@@ -1,7 +1,5 @@
 """``hexacell status``: cells at a glance, and their metrics for a monitoring system."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """``hexacell study``: what was published of the method, repeated on simulated robots."""
 
-from __future__ import annotations
-
 import argparse
 
 from hexacell.cli.console import Console

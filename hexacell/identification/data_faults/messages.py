@@ -1,7 +1,5 @@
 """Data faults for people: what is wrong, how that shows, and what to do about it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hexacell.identification.data_faults.hypotheses import (

@@ -6,8 +6,6 @@ the few joints that define them are off as well. The frames are therefore fitted
 units of its tolerance, by Gauss-Newton steps; and where the ball may be mounted elsewhere, its offset.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hexacell.identification.diagnostics.tolerance_check import ToleranceFitter, small_change

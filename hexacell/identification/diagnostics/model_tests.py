@@ -7,8 +7,6 @@ costs are linearized at the solution of all records (:class:`.LinearCosts`).
 Sources: Gelb (ed.), Applied Optimal Estimation, 1974 (innovations); Cook and Weisberg 1982 (deletion).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

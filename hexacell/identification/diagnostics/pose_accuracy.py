@@ -7,8 +7,6 @@ by the parameters, so its covariance is ``H C H^T``. In both, base and platform 
 workspace, so that teaching cannot remove what is left. The repeatability of the machine is not included.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -10,8 +10,6 @@ The residuals are then compared with it by an F-test, as of lack of fit against 
 Smith, Applied Regression Analysis, 3rd ed. 1998, chapter 2).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import Enum
 

@@ -12,8 +12,6 @@ computed and subtracted, and they never become parameters (variable projection; 
 and w for each point, with a prior on w, and k once for all points, with a prior as well.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -7,8 +7,6 @@ and those of lowest cost are the start points. The poses of all draws are solved
 Source: Rinnooy Kan and Timmer, Stochastic global optimization methods, Mathematical Programming 39, 1987.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The result of an identification: geometry, covariance, and what is wrong with the data."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import Enum, StrEnum
 from functools import cached_property

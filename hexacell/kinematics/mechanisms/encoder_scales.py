@@ -9,8 +9,6 @@ shows it. How large it is, the tolerances alone determine (``size`` of
 :class:`~hexacell.kinematics.mechanism.FrameFreedom`).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

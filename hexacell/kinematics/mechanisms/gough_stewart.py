@@ -33,8 +33,6 @@ Sources: Merlet, Parallel Robots, 2nd ed. 2006; LinuxCNC, ``genhexkins.c``, with
 ``StrutLengthCorrection``; its derivatives are own.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ constraint used is ``(|v_i|^2 - l_i^2) / (2 l_i)``: polynomial, and near zero th
 Source: Abtahi et al. 2010, eq. 4 and 14, and the leg equation in ``docs/method.md``.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hexacell.errors import UsageError

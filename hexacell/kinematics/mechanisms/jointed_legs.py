@@ -3,8 +3,6 @@
 Here the joints at the base's end are fixed; a mechanism that moves them says where they are.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hexacell.kinematics.geometry import Geometries, Geometry

@@ -24,8 +24,6 @@ uncertainty is theirs.
 Sources: Merlet, Parallel Robots, 2nd ed. 2006; Pierrot, Dauchez and Fournier, HEXA, IEEE ICAR 1991.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

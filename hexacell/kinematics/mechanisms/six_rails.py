@@ -20,8 +20,6 @@ count the opposite way.
 Sources: Merlet, Parallel Robots, 2nd ed. 2006; Pritschow and Wurst, CIRP Annals 46, 1997 (Linapod).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

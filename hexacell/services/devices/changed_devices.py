@@ -4,8 +4,6 @@ That may be on purpose, and a new run takes them as they are. But a preset, a re
 exchanged encoder changes what a robot is thought to do, so it is a remark of the device.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """One gauge, or the encoders, watched for some seconds while nothing is commanded."""
 
-from __future__ import annotations
-
 import time
 from collections import defaultdict
 from collections.abc import Awaitable, Callable, Mapping, Sequence

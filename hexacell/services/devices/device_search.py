@@ -3,8 +3,6 @@
 Serial ports with gauges, CAN buses with nodes, a controller.
 """
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Sequence
 from dataclasses import dataclass

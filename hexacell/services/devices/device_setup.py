@@ -1,7 +1,5 @@
 """The devices of a cell, real or simulated: the only module that knows which."""
 
-from __future__ import annotations
-
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A cell file made from a few answers: each is checked by the rules of the whole file."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """A run as its report needs it: from its folder alone, so that the report is the same at any time."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass

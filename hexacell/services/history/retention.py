@@ -5,8 +5,6 @@ in the controller now or be wanted back. So does one that is not over, whose pro
 cannot be read.
 """
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass

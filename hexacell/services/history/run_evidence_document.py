@@ -1,7 +1,5 @@
 """The evidence of a recorded run on the geometry, from its folder, as the archive keeps it."""
 
-from __future__ import annotations
-
 from collections.abc import Container
 
 import numpy as np

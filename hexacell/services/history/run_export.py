@@ -3,8 +3,6 @@
 Journal and trace of the wire are recorded without passwords; the files of configs may have secrets.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a run was and found, read from its folder: its summary, its result, the accuracy that it judged."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import suppress
 

@@ -1,7 +1,5 @@
 """The notice of a run that nobody watched: of its end, or of the failure that ended it."""
 
-from __future__ import annotations
-
 import socket
 from dataclasses import dataclass
 from datetime import UTC, datetime

@@ -4,8 +4,6 @@ Every notice is in a file of its own before it is sent. Whatever is not delivere
 Nothing here fails a run: what went wrong is in the outcome of each address.
 """
 
-from __future__ import annotations
-
 import fcntl
 import os
 import time

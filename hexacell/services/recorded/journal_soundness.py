@@ -5,8 +5,6 @@ before: numbers are those of a robot, sets and poses those of the cell file's pl
 what it follows from.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass

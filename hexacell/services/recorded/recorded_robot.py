@@ -1,7 +1,5 @@
 """The robot of a recorded run: as it was when the run began, which geometries it had, its noise."""
 
-from __future__ import annotations
-
 from hexacell.cell.model import CellSettings
 from hexacell.config.interface import ControllerGeometry
 from hexacell.errors import HexacellError

@@ -5,8 +5,6 @@ or is written: the config, the geometry that commanded the records, and the pose
 to again.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path

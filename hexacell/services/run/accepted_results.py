@@ -1,7 +1,5 @@
 """The last accepted result of a cell: what is known of the geometry that its controller runs with."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path

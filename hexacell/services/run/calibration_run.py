@@ -1,7 +1,5 @@
 """One calibration run of a cell: lock, connect, check, then run the engine."""
 
-from __future__ import annotations
-
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, replace

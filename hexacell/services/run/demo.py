@@ -1,7 +1,5 @@
 """Simulated cells: served to other processes, and calibrated as a demo in a folder of its own."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager

@@ -3,8 +3,6 @@
 The run never waits for who reads them. A target that cannot take a line is given up, and the run goes on.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import stat

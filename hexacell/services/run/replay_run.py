@@ -1,7 +1,5 @@
 """Replay of a recorded run in a temporary folder: without devices, and without any real config."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Sequence
 from dataclasses import replace

@@ -4,8 +4,6 @@ The service runs once, and a timer starts it. Sources: systemd.service(5), syste
 systemd.timer(5), systemd.syntax(7), crontab(5).
 """
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The schedule of a cell: units of systemd written, shown and removed; nothing else is touched."""
 
-from __future__ import annotations
-
 import grp
 import os
 import re

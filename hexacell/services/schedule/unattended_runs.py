@@ -1,7 +1,5 @@
 """Runs without a person: quiet hours, retries, checks repeated after an alarm, the longest time."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress

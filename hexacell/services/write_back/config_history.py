@@ -4,8 +4,6 @@ They are recorded beside the run folders. Where a record could not be written, a
 own folder has when it was, who approved it and why: in its journal, and ``applied.json``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The controller's config brought back to an earlier one that the cell's runs have kept, bit for bit."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The proposal of a run, written into the controller's config afterwards by a person."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path

@@ -3,8 +3,6 @@
 The HTML needs no other file, no script and no network. Both are the same, byte for byte, each time.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The report of one run, put together; its last chapters: conditions, instruments, files, who answers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import date

@@ -3,8 +3,6 @@
 The figures are SVG text that is the same, byte for byte, whenever it is drawn.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

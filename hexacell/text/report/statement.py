@@ -3,8 +3,6 @@
 In the order and words of ISO/IEC 17025:2017, 7.8, where they apply.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from hexacell.services.history.reported_run import ReportedRun

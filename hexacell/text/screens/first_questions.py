@@ -1,7 +1,5 @@
 """The questions that lead to a first cell file; nothing is written before the last is answered."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from hexacell.errors import HexacellError

@@ -1,7 +1,5 @@
 """Help: what each screen is for, in the words of who stands at the machine."""
 
-from __future__ import annotations
-
 SCREEN_HELP = {
     "cell": """\
 What is attached shows here as it is now: each gauge with its reading, unit, age and noise, the six \

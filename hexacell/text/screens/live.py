@@ -1,7 +1,5 @@
 """Text for the devices: what they show now, and what must hold before motion."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from hexacell.errors import HexacellError, flatten_errors

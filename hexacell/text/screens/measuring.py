@@ -1,7 +1,5 @@
 """Text for a run that is being measured: guidance, records with residuals, and the predicted accuracy."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from statistics import median
 

@@ -1,7 +1,5 @@
 """Text for the list of planned poses, in which a key excludes what the robot must not be sent to."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 from hexacell.cell.model import CellSettings

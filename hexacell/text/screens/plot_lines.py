@@ -1,7 +1,5 @@
 """Pictures with axes in characters: markers instead of colours, so that any terminal shows them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import ceil, floor, isfinite, log10
 

@@ -1,7 +1,5 @@
 """Text for the questions of a run, with the answers that they take."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from hexacell.run_process.messages import LiveSnapshot

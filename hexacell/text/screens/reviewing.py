@@ -1,7 +1,5 @@
 """Views of results: the review of a run, verdict and scope first, and the list of past runs."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hexacell.cell.model import CellSettings

@@ -1,7 +1,5 @@
 """What a screen knows of a run: a fold over the messages of its host, and the first line that shows it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime

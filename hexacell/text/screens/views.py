@@ -3,8 +3,6 @@
 Only the standard library is imported, so that the first screen is drawn before anything is computed.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import StrEnum
 

@@ -1,7 +1,5 @@
 """Rules that are evaluated once, after a move: where the joints are, and whether each gauge moved."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hexacell.kinematics.mechanism import MechanismWords

@@ -1,7 +1,5 @@
 """What every rule of a guard works with: the limits of an action, and how a trip is put together."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

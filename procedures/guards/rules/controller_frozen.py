@@ -1,7 +1,5 @@
 """The controller answers, but always the same, although the joints move."""
 
-from __future__ import annotations
-
 from drivers.errors import ControllerFrozen
 from procedures.guards.polling import PolledDevices
 from procedures.guards.rules.base import GuardLimits, fault_trip

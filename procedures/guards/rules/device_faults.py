@@ -1,7 +1,5 @@
 """Devices report a fault, or only garbled answers."""
 
-from __future__ import annotations
-
 from drivers.errors import GaugeAtEnd
 from procedures.guards.polling import PolledDevices
 from procedures.guards.rules.base import MAX_GARBLED, GuardLimits, fault_trip

@@ -1,7 +1,5 @@
 """A device is silent for longer than allowed."""
 
-from __future__ import annotations
-
 from procedures.guards.polling import PolledDevices
 from procedures.guards.rules.base import GuardLimits
 from procedures.run.trips import Guard, Trip

@@ -1,7 +1,5 @@
 """An encoder has an alarm or restarted, or a sample is incomplete."""
 
-from __future__ import annotations
-
 from procedures.guards.polling import PolledDevices
 from procedures.guards.rules.base import GuardLimits, fault_trip
 from procedures.run.trips import Guard, Trip

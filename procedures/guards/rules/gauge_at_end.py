@@ -1,7 +1,5 @@
 """A plunger reached an end of its travel."""
 
-from __future__ import annotations
-
 from drivers.errors import GaugeAtEnd
 from procedures.guards.polling import PolledDevices
 from procedures.guards.rules.base import GuardLimits, fault_trip

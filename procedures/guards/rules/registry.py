@@ -1,7 +1,5 @@
 """The rules that are evaluated continuously. A line here is all that makes a function a rule."""
 
-from __future__ import annotations
-
 from procedures.guards.polling import PolledDevices
 from procedures.guards.rules.ball_off_gauge import ball_off_gauge
 from procedures.guards.rules.base import GuardLimits, Rule

@@ -1,7 +1,5 @@
 """A stop input forbids motion."""
 
-from __future__ import annotations
-
 from drivers.stop_input import SUBJECT as STOP_LINE
 from procedures.guards.polling import PolledDevices
 from procedures.guards.rules.base import GuardLimits

@@ -1,7 +1,5 @@
 """A joint moved during standstill."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from procedures.guards.polling import PolledDevices

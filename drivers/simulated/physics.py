@@ -186,6 +186,8 @@ class RobotPhysics:
         self._settings = settings
         self._clock = clock
         self._random = np.random.default_rng(settings.seed)
+        # Of its own: a cell without this scatter is the same whether or not it could have it.
+        self._random_unseen = np.random.default_rng([settings.seed, 1])
         self._lock = threading.RLock()
         start = PoseBatch.of([home])
         self._shown_per_mm = 1.0 + 1e-6 * settings.encoders.common_scale_um_m
@@ -218,7 +220,10 @@ class RobotPhysics:
             scatter = motion.repeatability * self._random.standard_normal(6)
             actual = path / self._shown_per_mm + np.linspace(0.0, 1.0, len(path))[:, None] * scatter
             actual[0] = self._motion.joints(self._update())
-            self._unseen = self._unseen[1], motion.unseen_repeatability * self._random.standard_normal(6)
+            self._unseen = (
+                self._unseen[1],
+                motion.unseen_repeatability * self._random_unseen.standard_normal(6),
+            )
             stated_s = 0.0 if duration_s is None else duration_s + RAMP_S
             duration = max(motion.minimum_s, distance / motion.speed, stated_s)
             self._motion, self._rows_passed = Motion(actual, self._clock.now(), duration), 0

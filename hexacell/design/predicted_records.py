@@ -20,9 +20,9 @@ from hexacell.kinematics.sensitivity import POSITION, free_sensitivity, sensitiv
 from hexacell.limits.limits import Limits
 
 SAFETY_SIGMAS = 4.0
-CHANCE_SIGMAS = 2.5
-"""Standard deviations of what differs at each stop for which travel is kept. Where the ball leaves it all
-the same, another pose is taken: it stops elsewhere each time, so that this is no lasting loss."""
+STOP_SIGMAS = 2.5
+"""Standard deviations of where the joints stop for which travel is kept. Where the ball leaves it all the
+same, another pose is taken: it stops elsewhere each time, so that this is no lasting loss."""
 TRAVEL_SHARE = 0.9
 """Share of the travel that the predicted deviation and four sigma may use. The most informative poses are
 at this limit, thousands of 50,000 records; with three sigma one in some thousands left the travel."""
@@ -110,8 +110,8 @@ class PredictedRecords(Batch):
         covariance: of the deviations (n, 3, 3), mm^2, the parameters being known.
         deviation: expected deviations (n, 3), mm.
         sigma: standard deviations (n, 3), mm, of what the gauges x, y, z will show, as the parameters are
-            known now.
-        chance: (n, 3), mm, of what differs each time: noise, and where the joints stop.
+            known now, if the joints stop where they are commanded.
+        stops: (n, 3), mm, by where the joints stop.
     """
 
     targets: ReachableTargets
@@ -119,26 +119,26 @@ class PredictedRecords(Batch):
     covariance: Array
     deviation: Array
     sigma: Array
-    chance: Array
+    stops: Array
 
     @property
     def shown_sigma(self) -> Array:
         """Standard deviations (n, 3), mm, of what the gauges will show."""
-        return np.hypot(self.sigma, self.chance)
+        return np.hypot(self.sigma, self.stops)
 
     def stay_inside(self, limits: Limits) -> Mask:
         """Which deviations surely stay inside the gauges' room, by linear propagation."""
         return self.within(limits, TRAVEL_SHARE)
 
     def within(self, limits: Limits, share: float) -> Mask:
-        """Which deviations stay within a share of the gauges' room, by what is known of the geometry.
+        """Which deviations stay within a share of the gauges' room, with four sigma.
 
-        With what differs each time they are inside as well.
+        Wherever the joints stop they are surely inside as well.
         """
-        by_geometry = SAFETY_SIGMAS * self.sigma
-        spread = np.hypot(by_geometry, CHANCE_SIGMAS * self.chance)
-        is_near = limits.within_travel(self.deviation, by_geometry, share)
-        return is_near & limits.within_travel(self.deviation, spread, TRAVEL_SHARE)
+        spread = SAFETY_SIGMAS * self.sigma
+        stopped = np.hypot(spread, STOP_SIGMAS * self.stops)
+        is_within = limits.within_travel(self.deviation, spread, share)
+        return is_within & limits.within_travel(self.deviation, stopped, TRAVEL_SHARE)
 
 
 def predict_records(belief: RobotBelief, zero: GaugeZero, targets: ReachableTargets) -> PredictedRecords:
@@ -164,9 +164,9 @@ def _predicted(
 ) -> PredictedRecords:
     """The records by the derivatives of the ball's position, see :func:`position_derivatives`."""
     jacobian = by_parameters - zero.jacobian
-    both = belief.noise.record_covariance(by_joints) + zero.covariance
-    by_geometry = innovation_covariance(belief.covariance, jacobian, np.zeros((3, 3)))
-    sigma = belief.limits.sigma_along_gauges(by_geometry)
-    chance = belief.limits.sigma_along_gauges(both + belief.noise.stop_covariance(by_joints))
+    covariance = belief.noise.record_covariance(by_joints) + zero.covariance
+    total = innovation_covariance(belief.covariance, jacobian, covariance)
+    sigma = belief.limits.sigma_along_gauges(total)
+    stops = belief.limits.sigma_along_gauges(belief.noise.stop_covariance(by_joints))
     deviation = targets.poses.positions - zero.reference
-    return PredictedRecords(targets, jacobian, both, deviation, sigma, chance)
+    return PredictedRecords(targets, jacobian, covariance, deviation, sigma, stops)

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from hexacell.design.candidates import ReachableTargets
 from hexacell.design.predicted_records import (
-    CHANCE_SIGMAS,
+    STOP_SIGMAS,
     TRAVEL_SHARE,
     GaugeZero,
     PredictedRecords,
@@ -184,7 +184,7 @@ class _Scenario:
     def stop_spread(self, targets: NDArray[np.intp]) -> Array:
         """How far the ball may stop beside some of the targets (n, 3), mm, along the gauges."""
         covariance = self.belief.noise.stop_covariance(self.sensitivity.joints[1 + targets, :3])
-        return CHANCE_SIGMAS * self.belief.limits.sigma_along_gauges(covariance)
+        return STOP_SIGMAS * self.belief.limits.sigma_along_gauges(covariance)
 
     def nearly_all_hold(self) -> Mask:
         """At which targets (n,) the constraint holds on all of many sampled robots but the worst.
@@ -269,10 +269,11 @@ def _all_within(sampled: _SampledRobots, limits: Limits, stops: Array, share: fl
     deviations, margins = sampled.deviations, sampled.leg_margins
     spread = (deviations @ limits.frames.base).std(axis=0)
     mean_deviation, both = deviations.mean(axis=0), np.hypot(SIGMAS * spread, stops)
+    stopped = max(share, TRAVEL_SHARE)
     predicted = limits.within_travel(mean_deviation, SIGMAS * spread, share)
-    predicted &= limits.within_travel(mean_deviation, both, TRAVEL_SHARE)
+    predicted &= limits.within_travel(mean_deviation, both, stopped)
     stay = sampled.found & limits.within_travel(deviations, share=share)
-    stay &= limits.within_travel(deviations, stops, TRAVEL_SHARE)
+    stay &= limits.within_travel(deviations, stops, stopped)
     mean = margins.mean(axis=0)
     are_free = (mean >= SPARE_SIGMAS * np.sqrt(np.mean((margins - mean) ** 2, axis=0))).all(axis=-1)
     within: Mask = np.all(stay, axis=0) & predicted & are_free

@@ -123,8 +123,8 @@ def test_deviations_keep_to_the_room_that_the_zero_leaves(campaign, two_points):
         decision = two_points.decide(replace(state, zero_mm=zero))
         assert isinstance(decision, MeasurePose)
         spread = 4.0 * decision.sigma[0]
-        assert decision.deviation[0] - spread >= 0.92 * lower, "of chance 2.5 sigma are kept"
-        assert decision.deviation[0] + spread <= 0.92 * upper
+        assert decision.deviation[0] - spread >= 0.9 * lower - 1e-9
+        assert decision.deviation[0] + spread <= 0.9 * upper + 1e-9
     free = two_points.decide(state)
     assert abs(free.deviation[0]) + 4.0 * free.sigma[0] > 0.9 * 0.4, "otherwise the sides decide nothing"
 

@@ -11,11 +11,12 @@ moved.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from hexacell.cell.model import CellSettings
-from hexacell.design.predicted_records import CHANCE_SIGMAS, TRAVEL_SHARE
+from hexacell.design.predicted_records import SAFETY_SIGMAS, STOP_SIGMAS, TRAVEL_SHARE
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from hexacell.noise.ball_by_encoders import BallByEncoders
@@ -32,7 +33,7 @@ ROOM_KEPT = 0.5
 """Share of the gauges' room that a plunger has left on either side when the gauges are zeroed."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Allowances:
     """What may be off at a stop, at a standstill or back at a reference.
 
@@ -57,7 +58,7 @@ class Allowances:
         stated = self.settings.noise.encoder
         return self.is_measured and (self.stops > stated or self.robot.noise.encoder > SCATTER * stated)
 
-    @property
+    @cached_property
     def following(self) -> float:
         """How far a joint may stop from its command, in its unit.
 
@@ -76,12 +77,9 @@ class Allowances:
 
     def since(self, reference: Pose, before: Array, now: Array) -> ReferenceChange:
         """The change of two readings (9,) at one reference: gauges x, y, z, mm, then the encoders."""
-        ball, noise = self.ball_at(reference), self.robot.noise
-        change = now - before
+        ball, change = self.ball_at(reference), now - before
         joints = change[3:]
-        by_encoders = ball.by_joints * noise.encoders
-        two = 2.0 * (by_encoders @ by_encoders.T + np.diag(noise.gauges_mm**2))
-        covariance = two + ball.covariance(joints)
+        covariance = 2.0 * self._record_covariance(ball) + ball.covariance(joints)
         is_fixed = self.settings.guards.limits == "fixed"
         return ReferenceChange(
             unexplained_mm=change[:3] - ball.motion(joints),
@@ -109,11 +107,14 @@ class Allowances:
 
     def needed_travel_mm(self, reference: Pose) -> float:
         """Measuring range of gauges in which the ball stays by chance, if it is not moved at all, mm."""
-        ball, noise = self.ball_at(reference), self.robot.noise
-        by_joints = ball.by_joints[None]
-        records = 2.0 * noise.encoder_covariance(by_joints)[0] + noise.stop_covariance(by_joints)[0]
-        chance = np.sqrt(np.diag(records) + 2.0 * noise.gauges_mm**2).max()
-        return 2.0 * CHANCE_SIGMAS * float(chance) / TRAVEL_SHARE
+        ball = self.ball_at(reference)
+        records = 2.0 * SAFETY_SIGMAS**2 * self._record_covariance(ball)
+        stops = STOP_SIGMAS**2 * self.robot.noise.stop_covariance(ball.by_joints[None])[0]
+        return 2.0 * float(np.sqrt(np.diag(records + stops).max())) / TRAVEL_SHARE
+
+    def _record_covariance(self, ball: BallByEncoders) -> Array:
+        """Covariance (3, 3), mm^2, of what the gauges show in a record, less what its encoders explain."""
+        return np.asarray(self.robot.noise.record_covariance(ball.by_joints[None])[0])
 
     def ball_at(self, reference: Pose) -> BallByEncoders:
         """How the ball moves near a reference by what the encoders show."""

@@ -59,7 +59,7 @@ async def test_a_better_result_out_of_limits_is_rolled_back_if_nobody_keeps_it(r
     ended = await rig.run()
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
     assert ended.line.endswith("rolled back, the controller has its old config, the worse one")
-    assert happened(rig, events.ResultValidated)[0].verdict is not Verdict.PASS
+    assert happened(rig, events.ResultValidated)[0].verdict is Verdict.FAIL
     assert happened(rig, events.ResultAccepted) == [events.ResultAccepted(by=None)]
     assert rig.config == recording.config_before
 
@@ -73,7 +73,7 @@ async def test_a_result_that_a_person_keeps_stays_although_the_run_is_killed_bef
     assert rig.config == recording.config_after
     ended = await rig.run()
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
-    assert ended.line.endswith("; kept by a tester")
+    assert ended.line.endswith(": fail; kept by a tester")
     (shown,) = rig.operator.verifications
     assert shown.before_mm > shown.after_mm
     proposed = fold(recording.history).proposed

@@ -38,11 +38,9 @@ from hexacell.kinematics.rotations import Array
 from hexacell.limits.limits import Limits
 from hexacell.measurements.records import MeasurementSet
 from hexacell.plugins import Group, load
+from hexacell.robot.same_robot import require_frames, require_same_robot
 from hexacell.robot.stated import stated_effects, stated_limits
 from hexacell.uncertainty.effects import Effect, errors_by_effects
-
-FARTHEST_DRAWING = 0.25
-"""Largest difference of the drawing from a config, as a share of the largest number of the config."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -283,48 +281,11 @@ def robot_of(cell: Cell) -> Robot:
         )
     nominal = Geometry.of(cell.settings.mechanism.parameters, cell.settings.robot.nominal.model_dump())
     for geometry, path in ((controller.geometry, cell.config_path), (taught.geometry, cell.taught_path)):
-        _require_frames(cell.settings.mechanism, geometry, path)
+        require_frames(cell.settings.mechanism, geometry, path)
     line = cell.document.line_of(("robot", "nominal"))
-    _require_frames(cell.settings.mechanism, nominal, cell.path, line)
-    _require_same_robot(cell, nominal, controller.geometry)
+    require_frames(cell.settings.mechanism, nominal, cell.path, line)
+    require_same_robot(cell, nominal, controller.geometry)
     return make_robot(cell.settings, controller, taught=taught.geometry)
-
-
-def _require_frames(mechanism: Mechanism, geometry: Geometry, path: Path, line: int | None = None) -> None:
-    """Refuse a geometry whose joints do not fix a frame; raises ``FileError``."""
-    try:
-        mechanism.normalize_frames(geometry)
-    except UsageError as error:
-        raise FileError(
-            f"the geometry is no robot's: {error.problem}",
-            subject=path,
-            line=line,
-            action="Correct its joints",
-        ) from error
-
-
-def _require_same_robot(cell: Cell, drawing: Geometry, controller: Geometry) -> None:
-    """Refuse a drawing so far from the config that no calibration leads from one to the other.
-
-    Raises:
-        FileError: names the parameter that differs most.
-    """
-    mechanism = cell.settings.mechanism
-    units = mechanism.parameters.like_a_mm
-    drawn = mechanism.normalize_frames(drawing)[0].vector / units
-    commanding = mechanism.normalize_frames(controller)[0].vector / units
-    difference = np.abs(drawn - commanding)
-    worst = int(difference.argmax())
-    if difference[worst] > FARTHEST_DRAWING * np.abs(commanding).max():
-        parameter = mechanism.parameters.parameters[worst]
-        name, unit = mechanism.convention.display_name(parameter.name), parameter.kind.unit.shown
-        raise FileError(
-            f"the drawing is not of the robot in {cell.config_path}: {name} differs by "
-            f"{difference[worst]:.4g} {unit} once both are in the same frames",
-            subject=cell.path,
-            line=cell.document.line_of(("robot", "nominal")),
-            action="Correct [robot.nominal], or the config",
-        )
 
 
 def noise_of(settings: CellSettings) -> Noise:

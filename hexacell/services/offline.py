@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -19,15 +19,13 @@ from hexacell.campaign.feasibility import unreachable_share
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
-from hexacell.cell.model import CellSettings
 from hexacell.errors import FileError, HexacellError, UsageError, joined
 from hexacell.identification.identified_zeros import ParameterChoice
-from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, RecordId
 from hexacell.robot.model import robot_of
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services import search_effort
-from hexacell.storage.toml_document import KeyPath
+from hexacell.services.design_facts import StatedPose, require_design, stated_poses
 
 if TYPE_CHECKING:
     from hexacell.dry_run.campaign import DryRunResult
@@ -36,10 +34,6 @@ if TYPE_CHECKING:
 
 MOST_RECORDS_BEFORE_NEXT = 500
 """The estimate is made again record by record, as in a run."""
-
-
-StatedPose = tuple[KeyPath, str, Pose]
-"""Place of a pose in the cell file, its use, and the pose itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +131,8 @@ def next_pose(cell: Cell, measurements: MeasurementSet, *, rejections: int = 0) 
             action="Use `hexacell fit`; some 60 records identify a robot",
         )
     plan = plan_of(cell)
-    _require(cell, plan, _points(cell.settings, plan))
+    stated = stated_poses(cell.settings, has_list=plan.pose_list is not None)
+    _require(cell, plan, (one for one in stated if one[0][0] == "identification"))
     state = _state_of_records(plan, measurements, rejections)
     decision = _decide(plan, state)
     forecast = decision.forecast if isinstance(decision, MeasurePose) else plan.forecast(state)
@@ -195,14 +190,16 @@ def _decide(plan: Plan, state: CampaignState) -> StartPoint | MeasurePose | Fini
     return decision
 
 
-def require_stated_poses(cell: Cell, plan: Plan) -> None:
-    """Check that the controller can take every pose that a cell file states, within the limits.
+def require_stated_poses(cell: Cell) -> None:
+    """Check that the design can work, and that the controller can take every stated pose within the limits.
 
     Raises:
-        FileError: one is out of reach; with its line.
+        FileError: the design is wrong, or one pose is out of reach; with its line.
         SeveralErrors: more than one is.
     """
-    _require(cell, plan, [*_points(cell.settings, plan), *_other_poses(cell.settings)])
+    require_design(cell)
+    plan = plan_of(cell)
+    _require(cell, plan, stated_poses(cell.settings, has_list=plan.pose_list is not None))
 
 
 def _require(cell: Cell, plan: Plan, stated: Iterable[StatedPose]) -> None:
@@ -220,19 +217,3 @@ def _require(cell: Cell, plan: Plan, stated: Iterable[StatedPose]) -> None:
         failures += feasibility.reach_failures(plan)
     if failures:
         raise joined(f"{cell.path} has {len(failures)} mistakes", failures)
-
-
-def _points(settings: CellSettings, plan: Plan) -> Iterator[StatedPose]:
-    """The identification points; a list of poses takes their place."""
-    for n, point in enumerate(settings.identification.points if plan.pose_list is None else ()):
-        yield ("identification", "points", n), f"identification point {n + 1}", Pose(*point)
-
-
-def _other_poses(settings: CellSettings) -> Iterator[StatedPose]:
-    for n, point in enumerate(settings.verification.points):
-        yield ("verification", "points", n), f"verification point {n + 1}", Pose(*point)
-    for n, pose in enumerate(settings.task.poses):
-        yield ("task", "poses", n), f"task pose {n + 1}", Pose(*pose)
-    if (fixture := settings.length_check) is not None:
-        yield ("length_check", "first_seat"), "the first seat", Pose(*fixture.first_seat)
-        yield ("length_check", "distance_mm"), "the second seat", Pose(*fixture.second_seat)

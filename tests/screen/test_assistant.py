@@ -127,7 +127,7 @@ def test_a_file_that_came_meanwhile_is_not_written_over(path: Path) -> None:
 
 def test_points_out_of_reach_leave_no_file_and_a_sign_is_asked_in_words(path: Path) -> None:
     draft = CellDraft(path, {"points": "0 0 5500 200"})
-    with pytest.raises(HexacellError, match="reaches none of the points"):
+    with pytest.raises(HexacellError, match="stated poses are out of reach"):
         draft.write()
     assert not path.exists()
     draft = CellDraft(path, {"sign z": "no"})

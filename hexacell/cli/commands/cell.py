@@ -26,11 +26,11 @@ def main(options: argparse.Namespace) -> ExitCode:
         if not options.json:
             console.print(describe(cell).rstrip("\n"))
         return ExitCode.DONE
-    from hexacell.services.offline import plan_of, require_stated_poses  # noqa: PLC0415 - only for this action
+    from hexacell.services.offline import require_stated_poses  # noqa: PLC0415 - only for this action
 
     require_plugins(cell)
     with_passwords(cell.settings, cell.path.parent)
-    require_stated_poses(cell, plan_of(cell))
+    require_stated_poses(cell)
     console.document({"valid": True, "name": cell.settings.name})
     config = files_named(cell.config_paths)
     console.print(f"{options.cell}: valid, and so is its controller config {config}")

@@ -18,7 +18,7 @@ from hexacell.config.toml_format import NativeToml
 from hexacell.errors import FileError, HexacellError, flatten_errors
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.plugins import Group, load, names
-from hexacell.services.offline import plan_of, require_stated_poses
+from hexacell.services.offline import require_stated_poses
 from hexacell.storage.atomic_files import write_atomically
 from hexacell.storage.toml_document import KeyPath, TomlDocument
 
@@ -205,7 +205,7 @@ class CellDraft:
         write_atomically(self.path, self._text(self.given).encode())
         try:
             cell = load_cell(self.path)
-            require_stated_poses(cell, plan_of(cell))
+            require_stated_poses(cell)
         except HexacellError:
             self.path.unlink()
             raise

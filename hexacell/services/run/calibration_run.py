@@ -16,6 +16,7 @@ from hexacell.errors import FileError, HexacellError, UsageError, flatten_errors
 from hexacell.robot.model import config_layout, controller_geometry, robot_of
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services import search_effort
+from hexacell.services.design_facts import require_design
 from hexacell.services.devices.changed_devices import with_changes
 from hexacell.services.devices.device_setup import Connected, device_addresses, open_devices
 from hexacell.services.history.run_summary import state_of
@@ -287,6 +288,7 @@ def new_calibration(cell: Cell, mode: Mode, *, length_check: bool = False) -> Ca
         why, action = NEEDS_RESULT[mode]
         problem = f"no accepted result has this config: {why}"
         raise UsageError(problem, subject=cell.config_path, action=action)
+    require_design(cell)
     return Calibration(
         cell.settings,
         robot_of(cell),

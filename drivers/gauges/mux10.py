@@ -104,4 +104,4 @@ class Mux10Gauge(SerialGauge):
                 identification = await self._query(b"V\r", parse_identification)
         if displayed is None:
             return GaugeState(identification)
-        return GaugeState(identification, displayed.apparent_unit, displayed.decimals)
+        return GaugeState(identification, displayed.unit, displayed.decimals)

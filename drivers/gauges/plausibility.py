@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from decimal import Decimal
 
-from drivers.gauges.protocol import DisplayedValue
+from drivers.gauges.protocol import DisplayedValue, Unit
 from hexacell.cell.devices import GaugeSettings
 
 TRAVEL_MARGIN = 1.1
@@ -18,6 +18,9 @@ ALIKE_DIGITS, ALIKE_SHARE = 2.5, 0.1
 """Readings are alike within so many of their last digits, or this share of what may differ at all."""
 
 MIDDLE_OF = 3
+
+INCH_DECIMALS = 5
+"""Decimals of a display set to inches. Six are no hint: public firmware for Digimatic sends mm so."""
 
 
 def decimals_of(resolution_mm: float) -> int:
@@ -68,6 +71,19 @@ class DisplayHistory:
     def begin(self) -> None:
         """The gauge was opened: its zero may be another one."""
         self._range = None
+
+    def is_inch(self, shown: DisplayedValue, set_to: Unit | None) -> bool:
+        """Whether a value is in inches.
+
+        What the answer names decides, then what the instrument says it is set to, or the stated resolution,
+        while the decimals are as before. Only where nothing else tells the unit, decimals do.
+        """
+        if shown.unit is not None:
+            return shown.unit is Unit.INCH
+        is_known = set_to is Unit.MM or self._stated is not None
+        if is_known and self._decimals in {None, shown.decimals}:
+            return False
+        return shown.decimals == INCH_DECIMALS
 
     def other_decimals(self, shown: DisplayedValue) -> str | None:
         """Why a value has another unit or resolution, in words; None if it has not."""

@@ -10,8 +10,6 @@ from hexacell.errors import DeviceError
 
 TERMINATOR = b"\r"
 """Ends every request, and is the first line end of every answer."""
-INCH_DECIMALS = 5
-"""No instrument resolves 10 nm, so a display with this many decimals shows inches."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,11 +96,6 @@ class DisplayedValue:
         value = float(number)
         decimals = len(number.partition(".")[2])
         return cls(-value if sign == b"-" else value, decimals, unit, frame.decode("ascii").strip())
-
-    @property
-    def apparent_unit(self) -> Unit:
-        """The unit named in the answer, else the one inferred from the number of decimals."""
-        return self.unit or (Unit.INCH if self.decimals >= INCH_DECIMALS else Unit.MM)
 
 
 @dataclass(frozen=True, slots=True)

@@ -192,13 +192,13 @@ class SerialGauge(ABC):
     def _plausible(self, frame: bytes) -> DisplayedValue:
         """The value in an answer, which is in mm and fits to those before; raises as ``_parse_value``."""
         shown = self._parse_value(frame)
-        if shown.apparent_unit is Unit.INCH:
+        if self._history.is_inch(shown, None if self._state is None else self._state.unit):
             raise self._error(WrongSetting, *INCH)
         if reason := self._history.other_decimals(shown):
             action = "Press its in/mm key, or correct resolution_mm in the cell file"
             raise ImplausibleValue(frame, self._error(WrongSetting, reason, action))
         if reason := self._history.beyond_travel(shown):
-            action = "Check its cable; if its zero or preset key was pressed, open it again"
+            action = "Check its cable and its unit; if its zero or preset key was pressed, open it again"
             raise ImplausibleValue(frame, self._error(WrongAnswer, reason, action))
         self._history.keep_decimals(shown)
         return shown
@@ -321,4 +321,4 @@ class ValueOnlyGauge(SerialGauge):
             shown = await self._read_value()
         except GaugeAtEnd:
             return GaugeState()
-        return GaugeState(unit=shown.apparent_unit, decimals=shown.decimals)
+        return GaugeState(unit=shown.unit, decimals=shown.decimals)

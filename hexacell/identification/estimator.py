@@ -14,6 +14,7 @@ from hexacell.identification.data_faults.stepwise_selection import (
     UncorrectableFaultError,
     select_faults,
 )
+from hexacell.identification.data_faults.units import wrong_unit
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.fit import (
     COARSE,
@@ -45,10 +46,12 @@ def identify(problem: Problem, *, find_outliers: bool = True) -> Identification:
 
     Raises:
         IdentifiabilityError: the records cannot determine the parameters.
-        GaugeFaultError: a gauge fault, or a zero shift that leaves too few records.
+        GaugeFaultError: another unit, a gauge fault, or a zero shift that leaves too few records.
     """
     _require_enough_records(problem)
     _require_rotation_diversity(problem)
+    if find_outliers and (fault := wrong_unit(problem)) is not None:
+        raise GaugeFaultError(fault)
     try:
         selection = select_faults(problem) if find_outliers else Selection.of_all(problem)
     except UncorrectableFaultError as refused:

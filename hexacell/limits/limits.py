@@ -10,7 +10,7 @@ from hexacell.kinematics.geometry import Geometries, Geometry
 from hexacell.kinematics.mechanism import SAME_FRAMES, FrameTransform, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.limits.gauge_travel import GaugeRoom, GaugeTravel
+from hexacell.limits.gauge_travel import GaugeRoom, GaugeTravel, Three
 from hexacell.limits.leg_limits import ROUNDING, LegLimits
 
 
@@ -109,6 +109,14 @@ class Limits:
         if self.zeroed is not None:
             return self.zeroed
         return GaugeRoom.symmetric(self.gauge_travel_mm) if self.gauges is None else self.gauges.room()
+
+    @property
+    def travels_mm(self) -> Three:
+        """Measuring ranges of the gauges x, y and z; infinite where they are not known."""
+        if self.gauges is None:
+            return (np.inf, np.inf, np.inf)
+        x, y, z = self.gauges.half_mm
+        return 2.0 * x, 2.0 * y, 2.0 * z
 
     @property
     def sure_room(self) -> GaugeRoom:

@@ -30,6 +30,9 @@ CHANCE = 1e-3
 LEAST_RESPONSE = 0.4
 """Share of the moves that a gauge in mm must show. Healthy ones showed 0.79 of them and more."""
 
+LARGEST_RESPONSE = 30.0
+"""Share of the moves above which a gauge answers in micrometres."""
+
 LEAST_RESPONSE_INCHES = 0.027
 """Share of the moves below which a gauge follows nothing. In inches it shows a 25.4th of them."""
 
@@ -46,6 +49,7 @@ class GaugeMistake(StrEnum):
 
     DEAD = "dead"
     INCHES = "inches"
+    MICROMETRES = "micrometres"
     REVERSED = "reversed"
     EXCHANGED = "exchanged"
 
@@ -114,6 +118,7 @@ def judge_response(response: Array) -> tuple[TrialFinding, ...]:
         return (TrialFinding(GaugeMistake.DEAD, tuple(dead)),)
     groups = {
         GaugeMistake.INCHES: [gauge for gauge in axes if size[gauge] < LEAST_RESPONSE],
+        GaugeMistake.MICROMETRES: [gauge for gauge in axes if size[gauge] > LARGEST_RESPONSE],
         GaugeMistake.EXCHANGED: [gauge for gauge, axis in axes.items() if gauge != axis],
         GaugeMistake.REVERSED: [gauge for gauge, sign in signs.items() if sign < 0],
     }

@@ -157,6 +157,7 @@ class Robot:
             earlier=self.earlier,
             systematic=partial(errors_by_effects, self.effects),
             unknowns=self.unknowns,
+            travel_mm=self.limits.travels_mm,
         )
         return assumptions.problem(measurements, before)
 

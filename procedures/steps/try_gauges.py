@@ -23,12 +23,17 @@ MISTAKES: Mapping[GaugeMistake, tuple[str, str, str]] = {
     GaugeMistake.DEAD: (
         "does not follow the ball",
         "do not follow the ball",
-        "See whether the plunger touches the ball and is free, and whether the display changes",
+        "See whether the plunger touches the ball and is free, and the display changes in millimetres",
     ),
     GaugeMistake.INCHES: (
         "seems to answer in inches",
         "seem to answer in inches",
         "Press the in/mm key; if it answers in mm, see whether its plunger is free",
+    ),
+    GaugeMistake.MICROMETRES: (
+        "seems to answer in micrometres",
+        "seem to answer in micrometres",
+        "Set it to millimetres, or correct mm_per_unit in the cell file and begin a new run",
     ),
     GaugeMistake.EXCHANGED: (
         "answers on another axis",

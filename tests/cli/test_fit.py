@@ -80,3 +80,24 @@ def test_many_records_are_told_before_they_are_used(typed_here, demo, tmp_path, 
         patch.setattr("hexacell.cli.commands.records.MANY_RECORDS", 100)
         outcome = typed_here("fit", demo.cell, "--measurements", "m.csv")
     assert "records: this takes some 2 seconds\n" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [
+        (1e3, "gauges x, y, z seem to read in micrometres: most readings exceed the travel of 12.5 mm"),
+        (1 / 25.4, "gauges x, y and z seem to read in inches at every point"),
+        (1e-3, "gauges x, y, z seem to read in metres"),
+    ],
+)
+def test_deviations_in_another_unit_are_recognised(
+    typed_here, cell_folder, tmp_path, records, factor, words
+):
+    rows = [line.split(",") for line in records]
+    for row in rows[1:]:
+        row[-3:] = [repr(factor * float(cell)) for cell in row[-3:]]
+    assert rows[0][-3:] == ["dx", "dy", "dz"]
+    (tmp_path / "m.csv").write_text("\n".join(map(",".join, rows)))
+    outcome = fit(typed_here, cell_folder)
+    assert outcome.code == 1
+    assert words in outcome.err

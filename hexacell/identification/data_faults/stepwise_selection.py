@@ -78,6 +78,9 @@ TRIED_FIRST = 2
 CONFIRMED_SHARE = 0.5
 """Share of the first-order gain of a gauge fault that a refit must confirm."""
 
+SHOWN_DECREASE = 2.0
+"""Factor of the mean square residual that a gauge fault must explain: readings near 0 show none."""
+
 FEW_RECORDS = 60
 """Up to this number of records the cost may have several minima."""
 
@@ -182,9 +185,14 @@ class CorrectedFit:
         squares = self.fit.goodness.ratio**2 * self.fit.records + LARGEST_TRUSTED_RATIO**2 * self.lost
         return squares / self.problem.records
 
+    def misfit_beside(self, other: CorrectedFit) -> float:
+        """The misfit on the same records as another fit: those that are lost here alone count as there."""
+        further = max(0, self.lost - other.lost) / self.problem.records
+        return self.misfit + further * max(0.0, other.fit.goodness.ratio**2 - LARGEST_TRUSTED_RATIO**2)
+
     def is_better_by_far_than(self, other: CorrectedFit) -> bool:
         """Whether it explains so much more that it is right although something else is still wrong."""
-        return self.misfit < other.misfit / SUFFICIENT_DECREASE
+        return self.misfit_beside(other) < other.misfit / SUFFICIENT_DECREASE
 
     def settles(self, other: CorrectedFit) -> bool:
         """Whether no other hypothesis can explain it better: it agrees, or an imperfect machine is left."""
@@ -283,7 +291,8 @@ def confirmed_by_refit(current: CorrectedFit, hypothesis: FaultHypothesis) -> Co
     if corrected is None or not isinstance(hypothesis, GaugeFaultHypothesis):
         return corrected
     limit = current.fit.chi2 - CONFIRMED_SHARE * hypothesis.gain
-    is_proof = corrected.is_consistent or corrected.is_better_by_far_than(current)
+    is_shown = corrected.misfit_beside(current) < current.misfit / SHOWN_DECREASE
+    is_proof = is_shown and (corrected.is_consistent or corrected.is_better_by_far_than(current))
     return corrected if is_proof and corrected.fit.chi2 < limit else None
 
 
@@ -330,7 +339,8 @@ def _searched(current: CorrectedFit) -> CorrectedFit | None:
             continue
         if trial.settles(current):
             return trial
-        if trial.is_better_by_far_than(current) and (best is None or trial.misfit < best.misfit):
+        misfit = trial.misfit_beside(current)
+        if trial.is_better_by_far_than(current) and (best is None or misfit < best.misfit_beside(current)):
             best = trial
     return best
 

@@ -30,10 +30,13 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.measurements.records import MeasurementSet, RecordId
+from hexacell.measurements.records import Deviation, MeasurementSet, RecordId
 
 LEAST_SPARE_EQUATIONS = 13
 """Equations beyond the parameters from which agreement is a proof: fewer agree by chance."""
+
+NO_TRAVEL_MM: Deviation = (np.inf, np.inf, np.inf)
+"""Where the measuring ranges of the gauges are not known."""
 
 MAX_COUNTED_POSES = 1000
 """Number of records above which all poses count as different."""
@@ -61,6 +64,7 @@ class Problem:
             tests of it do.
         unknowns: how many parameters the records are to determine, the rest of them being known from the
             prior; 0: all.
+        travel_mm: measuring range of the gauges x, y and z.
     """
 
     mechanism: Mechanism
@@ -77,6 +81,7 @@ class Problem:
     gauges: Array
     systematic: SystematicModel = field(default=no_systematic_errors)
     unknowns: int = 0
+    travel_mm: Deviation = NO_TRAVEL_MM
 
     @property
     def basis(self) -> Array:
@@ -242,6 +247,7 @@ class Assumptions:
     earlier: Sequence[CommandingGeometry] = ()
     systematic: SystematicModel = no_systematic_errors
     unknowns: int = 0
+    travel_mm: Deviation = NO_TRAVEL_MM
 
     def problem(self, measurements: MeasurementSet, known: Problem | None = None) -> Problem:
         """The problem of a measurement set.
@@ -298,6 +304,7 @@ class Assumptions:
             gauges=frames.base,
             systematic=self.systematic,
             unknowns=self.unknowns,
+            travel_mm=self.travel_mm,
         )
 
 

@@ -32,6 +32,7 @@ class DataFaultKind(StrEnum):
     EXCHANGED = "exchanged gauges"
     REVERSED = "reversed gauge"
     INCHES = "inches"
+    UNIT = "another unit"
     ZERO_SHIFT = "slipped zero"
     MISMATCHED_JOINTS = "joint variables of another pose"
     SINGULAR = "next to a singularity"

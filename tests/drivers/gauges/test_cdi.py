@@ -51,7 +51,7 @@ parse_value = CdiGauge(GaugeSettings(name="y", axis="y", protocol="cdi"), Shared
 )
 def test_a_value_is_read_with_its_unit(frame, value, unit):
     shown = parse_value(frame)
-    assert (shown.value, shown.apparent_unit) == (value, unit)
+    assert (shown.value, shown.unit) == (value, unit)
 
 
 @pytest.mark.parametrize(

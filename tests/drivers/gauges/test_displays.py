@@ -41,6 +41,7 @@ VALUES = [
     (KEYENCE, 3, b"M0,+001.2345,-000.0010,-012.0000\r\n", -12.0),
     (DIGIMATIC, 1, b"-1.234\n", -1.234),
     (DIGIMATIC, 1, b"12.34\r\n", 12.34),
+    (DIGIMATIC, 1, b"1.234000\n", 1.234),  # open firmware always sends six decimals
 ]
 
 FAULTS = [

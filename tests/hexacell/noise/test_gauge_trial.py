@@ -13,7 +13,7 @@ from hexacell.noise.gauge_trial import GaugeMistake, GaugeTrial, TrialFinding, j
 from hexacell.robot.model import robot_of
 from hexacell.robot.virtual_robot import VirtualRobot, robots_within_tolerances
 
-DEAD, INCHES, REVERSED, EXCHANGED = GaugeMistake
+DEAD, INCHES, MICROMETRES, REVERSED, EXCHANGED = GaugeMistake
 NOISE_MM = 0.014
 HAND_DEG = 2.0
 
@@ -55,7 +55,8 @@ def test_exchanged_gauges_are_named_on_every_robot(responses, pair) -> None:
 
 @pytest.mark.parametrize("gauge", [0, 1, 2])
 @pytest.mark.parametrize(
-    ("factor", "mistake"), [(-1.0, REVERSED), (1.0 / 25.4, INCHES), (0.0, DEAD), (0.004, DEAD)]
+    ("factor", "mistake"),
+    [(-1.0, REVERSED), (1.0 / 25.4, INCHES), (1e3, MICROMETRES), (0.0, DEAD), (0.004, DEAD)],
 )
 def test_a_single_gauge_is_named_on_every_robot(responses, gauge, factor, mistake) -> None:
     findings = []

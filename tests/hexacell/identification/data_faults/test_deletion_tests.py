@@ -133,6 +133,29 @@ def test_a_gauge_fault_is_confirmed_by_agreement_or_by_far_smaller_residuals(
     assert found is (corrected if confirmed else None)
 
 
+def test_a_gauge_fault_that_hardly_lowers_the_residuals_is_not_named(noisy, make_problem, monkeypatch):
+    """Near zero, readings with another sign are nearly the same readings."""
+    before, after = (make_problem(with_encoders(noisy, waves(5, mm))) for mm in (0.02, 0.015))
+    current = CorrectedFit(before, before, fit_regularized(before))
+    corrected = CorrectedFit(after, after, fit_regularized(after))
+    assert not current.is_consistent
+    assert corrected.is_consistent
+    monkeypatch.setattr(CorrectedFit, "corrected_for", lambda *_: corrected)
+    assert confirmed_by_refit(current, replace(ALL_IN_INCHES, gain=0.0)) is None
+
+
+def test_a_correction_that_loses_most_records_is_not_better(noisy, make_problem):
+    """As when deviations in micrometres look exchanged: what is left then agrees with anything."""
+    problem = make_problem(noisy)
+    wrong = ALL_IN_INCHES.corrected(problem)
+    current = CorrectedFit.uncorrected(wrong)
+    rows = np.arange(problem.records) % 5 == 0
+    few = CorrectedFit(problem, problem, fit_regularized(problem.subset(rows)))
+    assert few.lost == problem.records - rows.sum()
+    assert few.misfit_beside(current) > 0.5 * current.misfit
+    assert not few.is_better_by_far_than(current)
+
+
 def test_a_gauge_fault_needs_equations_that_could_contradict_it(visit, make_problem):
     few, many = (visit(points=2, orientations=n, seed=81).measured(0.01, seed=81) for n in (8, 9))
     assert refitted(CorrectedFit.uncorrected(make_problem(few)), ALL_IN_INCHES) is None

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hexacell.identification.data_faults.units import wrong_unit
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import DataFaultKind, GaugeFaultError
 from hexacell.measurements.records import MeasurementSet
@@ -148,6 +149,31 @@ def test_a_gauge_fault_is_refused_and_named(visit, make_problem, change, point, 
     assert ("at every point:" if point is None else f"at point {point}:") in fault.sentence
     assert fault.left_out == ()
     assert str(raised.value) == f"{fault.sentence}. {fault.action}"
+
+
+@pytest.mark.parametrize(
+    ("factors", "unit", "gauges"),
+    [
+        ([1e3, 1e3, 1e3], "micrometres: most readings exceed the travel of 12.5 mm", "xyz"),
+        ([1.0, 1e3, 1.0], "micrometres", "y"),
+        ([1e-3, 1e-3, 1e-3], "metres: as millimetres they are", "xyz"),
+        ([1.0, 1.0, 1e-3], "metres", "z"),
+    ],
+)
+def test_another_unit_is_recognised_before_anything_else(visit, make_problem, factors, unit, gauges):
+    records = visit(degrees=4.0, seed=2).measured(0.01, seed=1)
+    problem = make_problem(changed(records, lambda d: d * factors))
+    with pytest.raises(GaugeFaultError, match=f"to read in {unit}") as raised:
+        identify(replace(problem, travel_mm=(12.5, 12.5, 12.5)))
+    assert (raised.value.fault.kind, raised.value.fault.gauges) == (DataFaultKind.UNIT, gauges)
+
+
+def test_small_deviations_of_a_good_machine_are_no_metres(visit, make_problem):
+    """Their noise would be a thousand times as large."""
+    random = np.random.default_rng(5)
+    records = visit(degrees=4.0, seed=2).measured(0.01, seed=1)
+    quiet = changed(records, lambda _: random.normal(0.0, 3e-3, 3))
+    assert wrong_unit(make_problem(quiet)) is None
 
 
 def test_a_gauge_fault_in_few_records_is_refused_too(noisy, make_problem):

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self, get_args
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from hexacell.cell.fields import (
     CertificateSettings,
@@ -96,7 +96,20 @@ class CommonUncertaintySettings(Section):
     expansion_legs_um_m_k: NotNegative = key(23.0, "thermal expansion of the legs, um/m/K")
     load_n: NotNegative = key(20.0, "force on the tool at work in each direction, N")
     leg_compliance_um_n: NotNegative = key(0.03, "compliance of a leg with its joints, um/N")
+    own_weight_n: NotNegative = key(
+        0.0,
+        "weight of the platform with what it carries while measuring, N; 0: its legs hardly yield to it",
+    )
+    own_weight_centre_mm: PointInRange | None = key(
+        None, "its centre in the platform frame of the drawing, mm; by default the middle of the joints"
+    )
+    own_weight_direction: Direction = key((0.0, 0.0, -1.0), "where it pulls, in the base frame")
     sources: dict[str, Text] = key({}, "where a size comes from, by its key")
+
+    @field_validator("own_weight_centre_mm", "own_weight_direction", mode="before")
+    @classmethod
+    def _a_list_is_a_vector(cls, given: object) -> object:
+        return tuple(given) if isinstance(given, list) else given
 
     @model_validator(mode="before")
     @classmethod
@@ -111,7 +124,8 @@ class CommonUncertaintySettings(Section):
 
     @model_validator(mode="after")
     def _sources_belong_to_sizes(self) -> Self:
-        known = {*type(self).model_fields, STOPS} - {"grade", "sources", "stop_repeatability_acts"}
+        no_sizes = {"grade", "sources", "stop_repeatability_acts", "own_weight_centre_mm"}
+        known = {*type(self).model_fields, STOPS} - {*no_sizes, "own_weight_direction"}
         if unknown := sorted(set(self.sources) - known):
             raise broken_rule(
                 f"sources has {unknown[0]}, which is no size of this section", "Correct the key"

@@ -32,6 +32,7 @@ from hexacell.uncertainty.effect_kinds import (
     encoder_scales,
     gauge_scales,
     load_at_work,
+    own_weight,
     rail_directions,
     rail_waves,
     stop_repeatability,
@@ -101,7 +102,7 @@ def _leg_limits(settings: CellSettings, controller: ControllerGeometry) -> LegLi
     if distance == 0.0 and np.min(cones) >= NO_CONE_DEG:
         return None
     mechanism = settings.mechanism
-    drawing = Geometry.of(mechanism.parameters, settings.robot.nominal.model_dump())
+    drawing = _drawing(settings)
     legs = _legs_in_the_middle(settings, mechanism, drawing, controller.branch)
     frames = mechanism.normalize_frames(drawing)[1]
     base = _unit(legs.directions_in_carriers[0] if stated.base_axes is None else stated.base_axes)
@@ -212,4 +213,23 @@ def stated_effects(settings: CellSettings, measured_range_k: float | None = None
         temperature_at_work(at_work_k, expansion, at_work_source),
         temperature_while_measuring(change_k, expansion, source),
         load_at_work(stated.load_n, stated.leg_compliance_um_n, stated.source("load_n")),
+        _own_weight(settings),
     )
+
+
+def _own_weight(settings: CellSettings) -> Effect:
+    """The effect of the platform's weight; its centre and direction are stated in the drawing's frames."""
+    stated, drawing = settings.uncertainty, _drawing(settings)
+    frames = settings.mechanism.normalize_frames(drawing)[1]
+    centre = stated.own_weight_centre_mm
+    return own_weight(
+        stated.own_weight_n,
+        stated.leg_compliance_um_n,
+        frames.base @ _unit(stated.own_weight_direction),
+        None if centre is None else frames.platform @ np.array(centre),
+        stated.source("own_weight_n"),
+    )
+
+
+def _drawing(settings: CellSettings) -> Geometry:
+    return Geometry.of(settings.mechanism.parameters, settings.robot.nominal.model_dump())

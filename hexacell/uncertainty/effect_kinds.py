@@ -152,6 +152,44 @@ def load_at_work(newton: float, um_per_n: float, source: str = "") -> Effect:
     return Effect("load at work", newton, "N", Occurrence.AT_WORK, bending, source=source)
 
 
+LEGS_DIFFER = 0.3
+"""Share by which the compliance of a leg, one standard deviation, differs from that of all legs."""
+
+
+def own_weight(
+    newton: float, um_per_n: float, direction: Array, centre_mm: Array | None = None, source: str = ""
+) -> Effect:
+    """Each leg yields by its part of a weight on the platform, all nearly alike.
+
+    Args:
+        newton: the weight.
+        um_per_n: compliance of a leg with its joints, one standard deviation.
+        direction: of the weight (3,), a unit vector in the convention's base frame.
+        centre_mm: where it acts (3,), in its platform frame; None: in the middle of the platform's joints.
+        source: where the weight comes from.
+    """
+
+    def yielding(placement: Placement) -> Array:
+        forces = leg_forces(placement, direction, centre_mm)
+        each = UM * um_per_n * placement.by_constraints * forces[:, None, :]
+        return np.concatenate([each.sum(axis=-1, keepdims=True), LEGS_DIFFER * each], axis=-1)
+
+    return Effect("own weight", newton, "N", Occurrence.CONSTANT, yielding, source=source)
+
+
+def leg_forces(placement: Placement, direction: Array, centre_mm: Array | None = None) -> Array:
+    """Forces (n, 6) of the legs by one newton on the platform; see :func:`own_weight` for the arguments."""
+    poses = placement.poses
+    if centre_mm is None:
+        legs = placement.mechanism.legs(placement.geometry, poses, placement.joints)
+        arms = legs.platform_joints.mean(axis=1) - poses.positions
+    else:
+        arms = poses.rotations @ centre_mm
+    wrench = np.concatenate([np.broadcast_to(direction, arms.shape), np.cross(arms, direction)], axis=-1)
+    # Virtual work: J^T t = w, with -J^-1 at hand.
+    return np.asarray(-np.einsum("nji,nj->ni", placement.by_constraints, wrench))
+
+
 def _warmer(placement: Placement, um_per_m_k: Mapping[MachinePart, float]) -> Array:
     """Errors of the poses (n, 6, 1) by one kelvin."""
     parameters = placement.mechanism.parameters

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hexacell.distributions import chi_square_limit
 from hexacell.identification.data_faults.hypotheses import (
     FaultHypothesis,
     GaugeFaultHypothesis,
@@ -35,7 +36,9 @@ from hexacell.uncertainty.effect_kinds import (
     ball_roundness,
     encoder_eccentricities,
     encoder_scales,
+    leg_forces,
     load_at_work,
+    own_weight,
     rail_directions,
     rail_waves,
 )
@@ -46,6 +49,12 @@ SMALLEST_SHARE = 0.1
 
 SMALLEST_REMAINDER = 1e-4
 """Share of the square of a direction of Z that stations and parameters must leave: less is rounding."""
+
+MOST_STEPS = 100
+"""Records from which on an encoder is tried to have lost its place."""
+
+FALSE_STEPS = 1e-3
+"""Probability that chance alone shows such a step: one of so many always explains something."""
 
 WAVELENGTHS_MM = (600.0, 1500.0)
 """Waves of the rails that are longer than the travel of a slider at one point."""
@@ -74,7 +83,10 @@ def _of_the_machine(test: ExcessTest) -> Iterator[PossibleCause]:
     columns = {
         "errors of the encoders": [*test.by_effects(of_encoders), *test.by_encoders()],
         "guides that are not straight or parallel": test.by_effects(rail_directions(1.0), *waves),
-        "legs that yield under the load": test.by_effects(load_at_work(1.0, 1.0)),
+        "legs that yield under the load": test.by_effects(
+            load_at_work(1.0, 1.0), own_weight(1.0, 1.0, test.down)
+        ),
+        "clearance in the legs that changes sides with the load": test.by_clearance(),
         "a temperature that changed while measuring": test.by_expansion(),
         "the gauges (scale, alignment, drift of the zero) or an oval ball": [
             *test.by_effects(ball_roundness(1.0)),
@@ -83,6 +95,22 @@ def _of_the_machine(test: ExcessTest) -> Iterator[PossibleCause]:
     }
     for name, parts in columns.items():
         yield PossibleCause(name, test.share_of_columns(parts))
+    yield from _lost_place(test)
+
+
+def _lost_place(test: ExcessTest) -> Iterator[PossibleCause]:
+    """The most likely encoder that reads something else from some record on, if the records show one."""
+    problem = test.found.problem
+    starts = np.unique(np.linspace(1, problem.records - 1, MOST_STEPS).astype(int))
+    later = np.arange(problem.records)[:, None] >= starts
+    columns = np.einsum("nil,nk->nilk", test.found.placement.by_joints(np.eye(LEGS))[:, :3], later)
+    gain, best = test.largest_gain(columns.reshape(problem.records, 3, -1))
+    significant = chi_square_limit(1, FALSE_STEPS / (LEGS * len(starts)))
+    if gain > significant * max(1.0, test.found.noise_test.ratio) ** 2:
+        leg, start = divmod(best, len(starts))
+        point, orientation = problem.labels[starts[start]].tolist()
+        name = f"encoder {leg + 1} that lost its place before point {point}, orientation {orientation}"
+        yield PossibleCause(name, test.share_of_gain(gain, 2))
 
 
 def _of_the_records(test: ExcessTest) -> Iterator[PossibleCause]:
@@ -129,6 +157,18 @@ class ExcessTest:
         """What one unit of each cause of some effects does to the records."""
         return [errors_of_records(effect, self.found.placement) for effect in effects]
 
+    @property
+    def down(self) -> Array:
+        """Where weights pull (3,): along the gauge z, in the convention's base frame."""
+        down: Array = -self.found.problem.gauges[:, 2]
+        return down
+
+    def by_clearance(self) -> list[Array]:
+        """Legs that are longer or shorter as the platform's weight pulls or pushes them."""
+        placement = self.found.placement
+        sides = np.sign(leg_forces(placement, self.down))
+        return [(placement.by_constraints * sides[:, None, :])[:, :3]]
+
     def by_encoders(self) -> list[Array]:
         """Encoders whose scale changes along them."""
         joints = self.found.problem.joints
@@ -166,8 +206,26 @@ class ExcessTest:
         at_point = problem.per_record(np.eye(problem.points))
         return np.asarray(np.einsum("nij,nm->nijm", columns, at_point).reshape(problem.records, 3, -1))
 
+    def largest_gain(self, columns: Array) -> tuple[float, int]:
+        """The largest decrease of the chi-square by one of the columns alone, and which."""
+        by_causes, remaining, values = self._beside_parameters(columns)
+        squares = np.sum(by_causes * remaining, axis=0)
+        gains = np.where(
+            squares > SMALLEST_REMAINDER, (remaining.T @ values) ** 2 / np.maximum(squares, 1e-300), 0.0
+        )
+        best = int(np.argmax(gains))
+        return float(gains[best]), best
+
     def _gain(self, columns: Array) -> tuple[float, int]:
-        """The decrease of the chi-square, and by how many unknowns."""
+        """The decrease of the chi-square by all columns, and by how many unknowns."""
+        by_causes, remaining, residuals = self._beside_parameters(columns)
+        values, axes = np.linalg.eigh(by_causes.T @ remaining)
+        seen = values > SMALLEST_REMAINDER
+        scores = axes[:, seen].T @ (remaining.T @ residuals)
+        return float(np.sum(scores**2 / values[seen])), int(np.count_nonzero(seen))
+
+    def _beside_parameters(self, columns: Array) -> tuple[Array, Array, Array]:
+        """Columns of length 1 without stations, what parameters leave of them, and the residuals."""
         prediction = self.found.prediction
         elimination = NuisanceElimination(self.found.problem, prediction.weights)
         both = np.concatenate([prediction.jacobian, columns], axis=-1)
@@ -175,8 +233,4 @@ class ExcessTest:
         by_parameters, by_causes = np.split(system.rows, [prediction.jacobian.shape[-1]], axis=1)
         by_causes = by_causes / np.maximum(np.linalg.norm(by_causes, axis=0), 1e-300)
         absorbed = self.found.free_covariance @ (by_parameters.T @ by_causes)
-        remaining = by_causes - by_parameters @ absorbed
-        values, axes = np.linalg.eigh(by_causes.T @ remaining)
-        seen = values > SMALLEST_REMAINDER
-        scores = axes[:, seen].T @ (remaining.T @ system.values)
-        return float(np.sum(scores**2 / values[seen])), int(np.count_nonzero(seen))
+        return by_causes, by_causes - by_parameters @ absorbed, system.values

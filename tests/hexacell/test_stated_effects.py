@@ -10,7 +10,7 @@ from hexacell.uncertainty.effects import Occurrence
 
 CONSTANTS = {
     *("grade", "sources", "rail_wave_short_mm", "rail_wave_long_mm", "leg_compliance_um_n"),
-    "stop_repeatability_acts",
+    *("stop_repeatability_acts", "own_weight_centre_mm", "own_weight_direction"),
 }
 
 

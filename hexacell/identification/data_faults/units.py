@@ -17,6 +17,9 @@ from hexacell.kinematics.rotations import Mask
 
 MM_PER_METRE = 1000.0
 
+FAR_BEYOND = 10.0
+"""Times the travel that nobody states too small by mistake."""
+
 SURE_SIGMAS = 10.0
 """Readings in metres are so many times larger than their noise, or agree with anything."""
 
@@ -27,9 +30,11 @@ def wrong_unit(problem: Problem) -> DataFault | None:
     readings = np.delete(problem.deviations @ problem.gauges, problem.first_rows, axis=0)
     if not len(readings):
         return None
-    usual = np.median(np.abs(readings), axis=0)
-    travel = np.asarray(problem.travel_mm)
-    if (beyond := (usual > travel) & (usual / MM_PER_METRE < travel)).any():
+    usual, travel = np.median(np.abs(readings), axis=0), np.asarray(problem.travel_mm)
+    beyond = (usual > travel) & (usual / MM_PER_METRE < travel)
+    # Gauges may have more travel than stated, but not so much more.
+    is_far = (usual > FAR_BEYOND * travel)[beyond].all()
+    if beyond.any() and (is_far or _agrees(problem, beyond, 1.0 / MM_PER_METRE)):
         evidence = (
             f"most readings exceed the travel of {travel[beyond].max():g} mm, and the largest is "
             f"{np.abs(readings[:, beyond]).max():.4g}"
@@ -38,19 +43,21 @@ def wrong_unit(problem: Problem) -> DataFault | None:
     noise = problem.noise.gauges_mm
     size = np.sqrt(np.mean(readings**2, axis=0))
     small = (size < noise) & (MM_PER_METRE * size > SURE_SIGMAS * noise)
-    if not small.any():
-        return None
-    remedy = np.diag(np.where(small, MM_PER_METRE, 1.0))
-    fault = GaugeFault(DataFaultKind.UNIT, _gauges(small), remedy)
+    if small.any() and _agrees(problem, small, MM_PER_METRE):
+        evidence = (
+            f"as millimetres they are {1e3 * size[small].max():.3g} um and smaller than their noise, and "
+            f"multiplied by {MM_PER_METRE:g} they agree with the encoders"
+        )
+        return _fault(small, "metres", evidence, "multiply")
+    return None
+
+
+def _agrees(problem: Problem, gauges: Mask, factor: float) -> bool:
+    """Whether all records agree with the noise once the readings of some gauges are multiplied."""
+    fault = GaugeFault(DataFaultKind.UNIT, _gauges(gauges), np.diag(np.where(gauges, factor, 1.0)))
     in_mm = GaugeFaultHypothesis(gain=0.0, unknowns=0, gauge_fault=fault, point=None)
-    corrected = CorrectedFit.uncorrected(in_mm.corrected(problem))
-    if not corrected.is_consistent or not problem.is_overdetermined:
-        return None
-    evidence = (
-        f"as millimetres they are {1e3 * size[small].max():.3g} um and smaller than their noise, and "
-        f"multiplied by {MM_PER_METRE:g} they agree with the encoders"
-    )
-    return _fault(small, "metres", evidence, "multiply")
+    corrected = in_mm.corrected(problem)
+    return problem.is_overdetermined and CorrectedFit.uncorrected(corrected).is_consistent
 
 
 def _gauges(which: Mask) -> str:

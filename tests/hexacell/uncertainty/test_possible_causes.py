@@ -6,7 +6,7 @@ import pytest
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import Placement
 from hexacell.identification.solver.chi_square import ChiSquareVerdict
-from hexacell.uncertainty.effect_kinds import load_at_work, rail_waves
+from hexacell.uncertainty.effect_kinds import leg_forces, load_at_work, rail_waves
 from hexacell.uncertainty.possible_causes import ExcessTest, possible_causes
 from tests.hexacell.altered_records import altered
 
@@ -17,6 +17,7 @@ ENCODERS, GUIDES, LOAD, TEMPERATURE, GAUGES = (
     "a temperature that changed while measuring",
     "the gauges (scale, alignment, drift of the zero) or an oval ball",
 )
+CLEARANCE = "clearance in the legs that changes sides with the load"
 
 
 @pytest.fixture(scope="module")
@@ -79,6 +80,29 @@ def test_wavy_rails(found_with, moved):
 
 def test_a_load(found_with, moved):
     assert first(found_with(deviations=moved(load_at_work(1.0, 1.0), np.array([5.0, -5.0, -40.0])))) == LOAD
+
+
+def test_clearance_that_changes_sides_with_the_load(found_with, clean):
+    placement = Placement(clean.problem.mechanism, clean.geometry, clean.poses, clean.problem.joints)
+    sides = np.sign(leg_forces(placement, np.array([0.0, 0.0, -1.0])))
+    assert (np.ptp(sides, axis=0) > 0.0).any()
+    moved = placement.by_constraints[:, :3] @ (0.1 * sides)[..., None]
+    assert first(found_with(deviations=moved[..., 0])) == CLEARANCE
+
+
+@pytest.mark.parametrize(("leg", "row", "lost_mm"), [(2, 17, 0.1), (5, 40, 0.3)])
+def test_an_encoder_that_lost_its_place(found_with, leg, row, lost_mm):
+    joints = np.zeros((55, 6))
+    joints[row:, leg] = lost_mm
+    name = f"encoder {leg + 1} that lost its place before point {row // 11 + 1}, orientation "
+    assert first(found_with(joints=joints)).startswith(name)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_encoder_is_said_to_have_lost_its_place_by_chance(found_with, seed):
+    random = np.random.default_rng(seed)
+    found = found_with(deviations=0.05 * random.standard_normal((55, 3)))
+    assert not [cause.name for cause in possible_causes(found) if "lost its place" in cause.name]
 
 
 def test_legs_that_grow_while_measuring(found_with, clean):

@@ -8,6 +8,7 @@ from hexacell.campaign.forecast import Forecaster
 from hexacell.campaign.online_estimate import RecordEstimator
 from hexacell.campaign.pilots import are_counted
 from hexacell.cell.model import CellSettings
+from hexacell.lengths import shown
 from hexacell.measurements.records import MeasurementSet
 
 REFUSALS = 3
@@ -92,7 +93,7 @@ class StoppingRules:
         worst = self.forecaster.worst_error(state, estimate.belief)
         if worst is None or worst > target:
             return None
-        return f"the predicted error at the task poses is {worst:.3f} mm, within {target:g}"
+        return f"the predicted error at the task poses is {shown(worst)}, within {target:g} mm"
 
     def _another_point(self, state: CampaignState, point: int) -> str | None:
         """Whether another point is worth more, if points are to be chosen, in words."""

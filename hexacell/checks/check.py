@@ -21,6 +21,7 @@ from hexacell.design.search_effort import USUAL_EFFORT, SearchEffort
 from hexacell.identification.problem.prior import IdentifiedBefore, drift_covariance, drift_sigma
 from hexacell.identification.solver.chi_square import ChiSquareVerdict
 from hexacell.kinematics.rotations import Array
+from hexacell.lengths import unit_of
 from hexacell.measurements.records import MeasurementSet, Record, RecordId
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.effects import Effect
@@ -124,7 +125,10 @@ class Check:
         stated = self.statement(measurements)
         if stated is None or not stated.is_decided:
             return None
-        return f"the error at the task poses is {stated.errors.position} mm: {stated.verdict}"
+        error = stated.errors.position
+        unit = unit_of(error.value, error.expanded)
+        size = f"{unit.number(error.value)} +- {unit.length(error.expanded)}"
+        return f"the error at the task poses is {size}: {stated.verdict}"
 
     def _statement(
         self, measurements: MeasurementSet, effects: tuple[Effect, ...]

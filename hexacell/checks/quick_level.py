@@ -15,6 +15,7 @@ from hexacell.checks.drift_estimator import DriftEstimator, ScaledEstimate
 from hexacell.design.criteria import add_information
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.problem.prior import IdentifiedBefore, Prior
+from hexacell.lengths import shown
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot
 from hexacell.verdict.check_statement import MOST_FURTHER_RECORDS
@@ -90,7 +91,7 @@ class QuickLevel:
         error, wanted = self._known_error(measurements), self.calibrated_mm
         if error is None or wanted is None or error > AS_ACCURATE * wanted:
             return None
-        return f"the predicted error at the task poses is {error:.3f} mm, that of the last calibration"
+        return f"the predicted error at the task poses is {shown(error)}, that of the last calibration"
 
     def reached_at(
         self,

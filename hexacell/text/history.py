@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from hexacell.lengths import unit_of
 from hexacell.services.history.run_index import PastRun
-from hexacell.text.layout import error_with_u, verdict_word, wrapped
+from hexacell.text.layout import change_with_sigma, error_with_u, verdict_word, wrapped
 
 if TYPE_CHECKING:
     from hexacell.results.run_comparison import ParameterTrend, RunComparison
@@ -77,7 +78,7 @@ def comparison_sentence(compared: RunComparison) -> str:
     if not compared.significant:
         return f"{ratio}, by several parameters together."
     most = compared.significant[0]
-    return f"{ratio}; most of all {most.name}, by {most.change:+.3f} {most.unit} (sigma {most.sigma:.3f})."
+    return f"{ratio}; most of all {most.name}, by {change_with_sigma(most)}."
 
 
 def drift_text(found: Sequence[ParameterTrend]) -> str:
@@ -134,14 +135,15 @@ def legs_text(found: FoundChange) -> str:
 
 def change_sentence(found: FoundChange) -> str:
     """A change that was found: which leg, by how much, when, and whether others changed as well."""
-    unit = found.parameter.kind.unit.value
+    unit = unit_of(found.change, found.sigma, unit=found.parameter.kind.unit.value)
     others = " and ".join(str(leg) for leg in found.other_legs)
-    size = f"{abs(found.change):.3f} +- {found.sigma:.3f} {unit}"
+    size = f"{unit.number(abs(found.change))} +- {unit.length(found.sigma)}"
     rest = f"legs {others} moved as well" if len(found.other_legs) > 1 else f"leg {others} moved as well"
     last = f"noticed {found.moved_again} more times, last {found.last_noticed:%Y-%m-%d}"
     again = f" It has moved on since; {last}." if found.moved_again else ""
     return (
-        f"leg {legs_text(found)} moved {size} (as {found.parameter.name} by {found.change:+.3f}) "
+        f"leg {legs_text(found)} moved {size} (as {found.parameter.name} by "
+        f"{unit.number(found.change, '+')}) "
         f"between {found.after:%Y-%m-%d %H:%M} and {found.before:%Y-%m-%d %H:%M}"
         f"; {rest if others else 'the others did not'}. "
         f"Noticed {found.noticed:%Y-%m-%d}.{again}"

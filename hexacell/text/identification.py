@@ -5,6 +5,7 @@ from hexacell.identification.identified_zeros import IdentifiedZeros
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import JointUnit
+from hexacell.lengths import shown, unit_of
 from hexacell.noise.record_noise import NoiseLevels, Repeatability
 from hexacell.text.layout import wrapped
 from hexacell.text.measured_noise import measured_noise_text
@@ -14,16 +15,13 @@ from hexacell.verdict.assessment import Assessment
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.findings import findings, noise_sentence, pair_sentences, residual_sentence
 
-SMALLEST_BUDGET_LINE_MM = 0.0005
-"""Lines of an uncertainty budget below this are left out: they would be zero in the table, mm."""
-
 
 def identification_report(assessed: Assessment) -> str:
     """The whole report that ``hexacell fit`` prints."""
     found, budget = assessed.found, assessed.budget
     expanded = ""
     if budget is not None and not assessed.refused:
-        expanded = f" U at the task poses is {budget.expanded_mm:.3f} mm."
+        expanded = f" U at the task poses is {shown(budget.expanded_mm)}."
     pairs = [wrapped(sentence, indent=2) for sentence in pair_sentences(assessed)]
     more = len(assessed.correlated) - len(pairs)
     parts = (
@@ -68,14 +66,18 @@ def accuracy_table(assessed: Assessment) -> str:
     if accuracy is None:
         return ""
     what = "task poses" if assessed.task_named else "poses across the workspace"
-    title = f"Predicted error at {len(accuracy.poses)} {what}"
+    title, unit = (
+        f"Predicted error at {len(accuracy.poses)} {what}",
+        unit_of(accuracy.after.position_largest_mm),
+    )
     lines = [
-        f"{title:44}{'position, mm':>17}{'angle, deg':>18}",
+        f"{title:44}{f'position, {unit.name}':>17}{'angle, deg':>18}",
         f"{'':44}{'rms':>8}{'largest':>9}{'rms':>9}{'largest':>9}",
     ]
     names = "geometry the controller has now", "identified geometry (one sigma)"
     for name, errors in zip(names, (accuracy.before, accuracy.after), strict=True):
-        position = f"{errors.position_rms_mm:8.3f}{errors.position_largest_mm:9.3f}"
+        rms, largest = errors.position_rms_mm, errors.position_largest_mm
+        position = f"{unit.number(rms):>8}{unit.number(largest):>9}"
         angle = f"{errors.orientation_rms_deg:9.4f}{errors.orientation_largest_deg:9.4f}"
         lines.append(f"  {name:42}{position}{angle}")
     return "\n".join(lines)
@@ -152,27 +154,28 @@ def budget_table(budget: UncertaintyBudget | None) -> str:
     """One line for the noise and each effect that matters, their sum, and what the records cannot show."""
     if budget is None:
         return ""
-    title = "Uncertainty at the worst task pose, mm"
+    unit = unit_of(budget.expanded_mm)
+    title = f"Uncertainty at the worst task pose, {unit.name}"
     noise = "noise, and all that is not identified" if budget.has_held else "noise of the readings"
     expanded = f"U, 95 %, of the largest error of all poses (angle: {budget.expanded_deg:.3f} deg)"
     lines = [
         f"{title:44}{'size':>12}{'result':>8}{'direct':>8}{'both':>8}",
-        f"  {noise:42}{'':12}{budget.noise_mm:8.3f}{'':8}{budget.noise_mm:8.3f}",
+        f"  {noise:42}{'':12}{unit.number(budget.noise_mm):>8}{'':8}{unit.number(budget.noise_mm):>8}",
     ]
     for line in budget.lines:
-        if max(line.through_mm, line.direct_mm, line.combined_mm) >= SMALLEST_BUDGET_LINE_MM:
-            through, direct = (
-                f"{mm:8.3f}" if mm else f"{'-':>8}" for mm in (line.through_mm, line.direct_mm)
-            )
+        sizes = line.through_mm, line.direct_mm, line.combined_mm
+        if max(sizes) >= unit.smallest:
             size = f"{line.effect.size:.3g} {line.effect.unit}"
-            lines.append(f"  {line.effect.name:42}{size:>12}{through}{direct}{line.combined_mm:8.3f}")
-    lines.append(f"  {'standard uncertainty (root of the squares)':70}{budget.standard_mm:8.3f}")
-    lines.append(f"  {expanded:70}{budget.expanded_mm:8.3f}")
+            shares = "".join(f"{unit.number(mm) if mm else '-':>8}" for mm in sizes)
+            lines.append(f"  {line.effect.name:42}{size:>12}{shares}")
+    standard = "standard uncertainty (root of the squares)"
+    lines.append(f"  {standard:70}{unit.number(budget.standard_mm):>8}")
+    lines.append(f"  {expanded:70}{unit.number(budget.expanded_mm):>8}")
     unseen = []
     for line in budget.unseen:
         mm = line.per_unit_mm
-        shown = f"{mm:.2g} mm" if mm >= 0.1 else f"{1e3 * mm:.2g} um"
-        unseen.append(f"{line.effect.name} ({shown} by 1 {line.effect.unit})")
+        size = f"{mm:.2g} mm" if mm >= 0.1 else f"{1e3 * mm:.2g} um"
+        unseen.append(f"{line.effect.name} ({size} by 1 {line.effect.unit})")
     if unseen:
         lines.append(wrapped(f"Not checked, as no record shows it: {', '.join(unseen)}.", indent=2))
     return "\n".join(lines)

@@ -6,6 +6,10 @@ import textwrap
 from datetime import datetime
 from typing import TYPE_CHECKING
 
+from hexacell.checks.check_result import ParameterChange
+from hexacell.lengths import MM, unit_of
+from hexacell.results.run_comparison import ParameterDifference
+
 if TYPE_CHECKING:
     from hexacell.verdict.decision import Verdict, VerifiedAccuracy
 
@@ -41,9 +45,19 @@ def verdict_word(verdict: Verdict | None) -> str:
 
 def figure_with_u(value: float | None, expanded: float | None) -> str:
     """A figure +- its expanded uncertainty in a column of a table; a dash without one."""
-    return "-" if value is None or expanded is None else f"{value:.3f} +- {expanded:.3f}"
+    if value is None or expanded is None:
+        return "-"
+    shown = unit_of(value, expanded)
+    text = f"{shown.number(value)} +- {shown.number(expanded)}"
+    return text if shown is MM else f"{text} {shown.name}"
 
 
 def error_with_u(accuracy: VerifiedAccuracy | None) -> str:
     """The largest position error at the task poses, +- its expanded uncertainty, mm; a dash without one."""
     return "-" if accuracy is None else figure_with_u(accuracy.position.value, accuracy.position.expanded)
+
+
+def change_with_sigma(one: ParameterChange | ParameterDifference) -> str:
+    """The change of a parameter with its standard deviation, in words."""
+    unit = unit_of(one.change, one.sigma, unit=one.unit)
+    return f"{unit.number(one.change, '+')} {unit.name} (sigma {unit.number(one.sigma)})"

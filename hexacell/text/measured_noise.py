@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from hexacell.kinematics.parameters import JointUnit
+from hexacell.lengths import shown, unit_of
 from hexacell.noise.approach_scatter import RepeatedApproaches, ScatterSource
 from hexacell.noise.measured_noise import AveragingForecast, InstrumentNoise, MeasuredNoise
 from hexacell.noise.noise_assessment import worthwhile_windows
@@ -47,7 +48,7 @@ def _stops(approaches: RepeatedApproaches) -> str:
     size = f"{_number(approaches.stops)} {approaches.stop_unit.thousandth}"
     return (
         f"  each joint stops {size} (one sigma) beside its command, as its encoder shows: the ball by "
-        f"{approaches.ball_mm:.3f} mm. The records know it; the robot at work errs by it, and no geometry "
+        f"{shown(approaches.ball_mm)}. The records know it; the robot at work errs by it, and no geometry "
         "corrects that"
     )
 
@@ -119,8 +120,9 @@ def _averaging(measured: MeasuredNoise) -> Iterator[str]:
         return
     first, chosen = measured.forecasts[0], measured.windows
     part = measured.encoders_part_mm
-    of_encoders = "" if part is None else f"the encoders contribute {part:.3f} of "
-    yield f"  {of_encoders}the {first.error_mm:.3f} mm expected at the task in the end (one sigma)"
+    unit = unit_of(first.error_mm)
+    of_encoders = "" if part is None else f"the encoders contribute {unit.number(part)} of "
+    yield f"  {of_encoders}the {unit.length(first.error_mm)} expected at the task in the end (one sigma)"
     by_windows = {one.windows: one for one in measured.forecasts}
     possible = worthwhile_windows(measured.forecasts, max(by_windows))
     if chosen > 1:
@@ -140,12 +142,14 @@ def averaging_lines(
     if len(forecasts) < 2 or encoders_part_mm is None:
         return
     first, fourfold = forecasts[0], forecasts[min(2, len(forecasts) - 1)]
+    unit = unit_of(first.error_mm)
     yield (
-        f"The noise of the encoders makes about {encoders_part_mm:.3f} of {first.error_mm:.3f} mm (one "
+        f"The noise of the encoders makes about {unit.number(encoders_part_mm)} of "
+        f"{unit.length(first.error_mm)} (one "
         f"sigma). As far as noise differs from reading to reading, which a run measures, "
         f"{fourfold.windows} windows of readings a record give {_gain(fourfold)}."
     )
 
 
 def _gain(one: AveragingForecast) -> str:
-    return f"{one.error_mm:.3f} mm for {duration(one.minutes)} more"
+    return f"{shown(one.error_mm)} for {duration(one.minutes)} more"

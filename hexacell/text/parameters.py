@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from procedures.run.state import RunState
 
 
+SMALLEST_SIGMA = 0.002
+"""Of figures in mm or mrad that are known better than this, five decimals are shown."""
+
+
 @dataclass(frozen=True, slots=True)
 class ParameterRow:
     """A parameter, its change and one standard deviation of that, in its unit.
@@ -59,7 +63,8 @@ class ParameterRow:
 
     def figure(self, value: float | None, sign: str = "") -> str:
         """A value in the unit shown, mm or mrad; empty for None."""
-        return "" if value is None else f"{value / self.unit.like_a_mm:{sign}.3f}"
+        decimals = 3 if self.sigma / self.unit.like_a_mm >= SMALLEST_SIGMA else 5
+        return "" if value is None else f"{value / self.unit.like_a_mm:{sign}.{decimals}f}"
 
 
 def parameter_rows(

@@ -9,6 +9,7 @@ from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPo
 from hexacell.checks.quick_level import QuickAccuracy
 from hexacell.dry_run.quick_level import QuickTrial
 from hexacell.dry_run.verdict_forecast import NOISE, WANTED, VerdictForecast
+from hexacell.lengths import shown, unit_of
 from hexacell.measurements.records import RecordId
 from hexacell.results.result import AcceptedResult
 from hexacell.services.offline import PlanTrial
@@ -45,21 +46,21 @@ def forecast_text(forecast: Forecast | None) -> str:
     """The predicted error now, and what the remaining records gain."""
     if forecast is None:
         return "The robot can take none of the task poses, so no accuracy is predicted."
-    now = f"Predicted error at the worst task pose {forecast.now_mm:.3f} mm (one sigma)"
-    now += _expanded(forecast, forecast.now_mm, " mm with the systematic effects")
+    now = f"Predicted error at the worst task pose {shown(forecast.now_mm)} (one sigma)"
+    now += _expanded(forecast, forecast.now_mm, " with the systematic effects")
     if not forecast.records:
         return f"{now}."
-    then = _expanded(forecast, forecast.end_mm, " mm then")
+    then = _expanded(forecast, forecast.end_mm, " then")
     return (
-        f"{now}; continuing gains {forecast.gain_mm:.3f} mm{then} in {forecast.records} records, about "
+        f"{now}; continuing gains {shown(forecast.gain_mm)}{then} in {forecast.records} records, about "
         f"{duration(forecast.minutes)}."
     )
 
 
-def _expanded(forecast: Forecast, error_mm: float, unit: str = "") -> str:
-    """U for one of the predicted errors; empty where it is not known."""
+def _expanded(forecast: Forecast, error_mm: float, when: str = "") -> str:
+    """U for one of the predicted errors, with its unit and ``when``; empty where it is not known."""
     expanded = forecast.expanded_mm(error_mm)
-    return "" if expanded is None else f", U {expanded:.3f}{unit}"
+    return "" if expanded is None else f", U {shown(expanded)}{when}"
 
 
 def left_out_text(records: Sequence[RecordId]) -> str:
@@ -72,13 +73,19 @@ def left_out_text(records: Sequence[RecordId]) -> str:
 
 def run_forecast_line(forecast: Forecast) -> str:
     """The predicted error after the record that was forecast, and at the end, each with its U."""
-    now = f"{forecast.next_mm:.3f} mm{_expanded(forecast, forecast.next_mm)}"
+    unit = unit_of(forecast.end_mm)
+
+    def with_u(error_mm: float, size: str) -> str:
+        expanded = forecast.expanded_mm(error_mm)
+        return size if expanded is None else f"{size}, U {unit.number(expanded)}"
+
+    now = with_u(forecast.next_mm, unit.length(forecast.next_mm))
     line = f"  predicted error at the task {now}"
     left = forecast.records - 1
     if left < 1:
         return line
     minutes = duration(forecast.minutes * left / forecast.records)
-    return f"{line}; in {minutes} {forecast.end_mm:.3f}{_expanded(forecast, forecast.end_mm)}"
+    return f"{line}; in {minutes} {with_u(forecast.end_mm, unit.number(forecast.end_mm))}"
 
 
 def plan_trial_lines(trial: PlanTrial) -> Iterator[str]:
@@ -94,13 +101,13 @@ def plan_trial_lines(trial: PlanTrial) -> Iterator[str]:
     else:
         yield (
             f"{result.records} records at {result.points} points will give about "
-            f"{result.worst_sigma_mm:.3f} mm at the worst of your task poses (one sigma), in about "
+            f"{shown(result.worst_sigma_mm)} at the worst of your task poses (one sigma), in about "
             f"{duration(result.minutes)}."
         )
         if result.expanded_mm is not None:
             yield (
                 f"The expanded uncertainty U of the largest error there will be about "
-                f"{result.expanded_mm:.3f} mm, with the systematic effects of [uncertainty]."
+                f"{shown(result.expanded_mm)}, with the systematic effects of [uncertainty]."
             )
         if result.verdicts is not None:
             yield from verdict_forecast_lines(result.verdicts)
@@ -157,7 +164,9 @@ def _warning(forecast: VerdictForecast) -> str:
         limits.append(f"position_mm = {_rounded_up(wanted.position_mm):g}")
     if wanted.orientation_deg > present.orientation_deg:
         limits.append(f"orientation_deg = {_rounded_up(wanted.orientation_deg):g}")
-    part = f"{forecast.largest_part} ({forecast.largest_part_mm:.3f} of {forecast.standard_mm:.3f} mm)"
+    unit = unit_of(forecast.standard_mm)
+    sizes = f"{unit.number(forecast.largest_part_mm)} of {unit.length(forecast.standard_mm)}"
+    part = f"{forecast.largest_part} ({sizes})"
     remedy = "have it calibrated, or measure it, and state its size in [uncertainty]"
     if forecast.largest_part == NOISE:
         remedy = "more records, or means of more readings, reduce it"
@@ -191,10 +200,11 @@ def quick_accuracy_text(found: QuickAccuracy) -> str:
 
 def quick_accuracy_sentences(found: QuickAccuracy) -> str:
     """How well the robot is known after a quick level, and what more records would give."""
-    further = ", ".join(f"{one.records} more {one.error_mm:.3f}" for one in found.further)
+    unit = unit_of(found.error_mm, found.calibrated_mm)
+    further = ", ".join(f"{one.records} more {unit.number(one.error_mm)}" for one in found.further)
     return (
-        f"{found.records} records leave {found.error_mm:.3f} mm at the worst task pose (one sigma), "
-        f"{found.ratio:.2g} times the {found.calibrated_mm:.3f} that the last calibration left. "
+        f"{found.records} records leave {unit.length(found.error_mm)} at the worst task pose (one sigma), "
+        f"{found.ratio:.2g} times the {unit.number(found.calibrated_mm)} that the last calibration left. "
         f"{_to_calibrated(found)} Of more records ([quick] budget_records), {further} would be left."
     )
 

@@ -5,11 +5,12 @@ from pathlib import Path
 
 from hexacell.checks.change_alarm import ChangeAlarm
 from hexacell.checks.check_result import CheckResult
+from hexacell.lengths import from_to, unit_of
 from hexacell.results.result import AcceptedResult, ExpectedImprovement, LengthResult
 from hexacell.results.written_geometry import TaskDisplacement
-from hexacell.text.layout import wrapped
+from hexacell.text.layout import change_with_sigma, wrapped
 from hexacell.verdict.acceptance_gates import AcceptanceGate
-from hexacell.verdict.decision import Verdict, VerifiedAccuracy
+from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy
 from hexacell.verdict.length_check import LengthStatement
 from hexacell.verdict.outcome import scale_words
 from hexacell.verdict.verification import Verification
@@ -37,12 +38,18 @@ def verification_text(verified: Verification) -> str:
     lines = [verdict, *_error_lines(verified.accuracy)]
     if verified.before_mm is not None and verified.after_mm is not None:
         worse = ", significantly worse" if verified.is_worse else ""
-        means = f"{verified.before_mm:.2f} -> {verified.after_mm:.3f} mm"
+        means = from_to(verified.before_mm, verified.after_mm, 2)
         lines.append(f"  mean deviation at held-out poses {means}{worse}")
     lines += [f"  {wrapped(test.sentence, indent=2)}" for test in verified.tests if not test.passed]
     if verified.accuracy is not None:
         lines += [f"  {line}" for line in scale_lines(verified.accuracy.length, verified.accuracy.scale_of)]
     return "\n".join(lines)
+
+
+def _size(error: JudgedError, unit: str) -> str:
+    """An error and its uncertainty."""
+    shown = error.shown_in(unit)
+    return f"{shown.length(error.value)}, U {shown.number(error.expanded)}"
 
 
 def _error_lines(accuracy: VerifiedAccuracy | None) -> Iterator[str]:
@@ -52,12 +59,11 @@ def _error_lines(accuracy: VerifiedAccuracy | None) -> Iterator[str]:
     what = "task poses" if accuracy.task_named else "poses across the workspace"
     for name, unit, error in accuracy.errors:
         where = f"at {accuracy.poses} {what}" if name == "position" else "there"
-        size = f"{error.value:.3f} {unit}, U {error.expanded:.3f} (limit {error.limit:g})"
-        yield f"  largest {name} error {where}: {size}"
+        limit = error.shown_in(unit).limit(error.limit)
+        yield f"  largest {name} error {where}: {_size(error, unit)} (limit {limit})"
     if (geometry := accuracy.of_geometry) is not None:
-        found = geometry.position
-        size = f"{found.value:.3f} mm, U {found.expanded:.3f}: {geometry.verdict}"
-        yield f"  of that by the geometry: {size}; the rest is scatter"
+        size = _size(geometry.position, "mm")
+        yield f"  of that by the geometry: {size}: {geometry.verdict}; the rest is scatter"
     guard_bands = [error.guard_band for _, _, error in accuracy.errors if error.guard_band]
     if guard_bands:
         yield f"  a pass and a fail keep {guard_bands[0]} from the limit"
@@ -81,15 +87,15 @@ def _change_lines(found: CheckResult) -> Iterator[str]:
         return
     most, since = found.significant_change, f"{found.earlier_at:%Y-%m-%d}"
     if most is not None:
-        change = f"{most.name} by {most.change:+.3f} {most.unit} (sigma {most.sigma:.3f})"
-        yield f"  changed most since {since}: {change}"
+        yield f"  changed most since {since}: {most.name} by {change_with_sigma(most)}"
     elif found.verdict is Verdict.PASS:
         yield f"  no parameter has changed significantly since {since}"
 
 
 def alarm_sentence(alarm: ChangeAlarm) -> str:
     """What an alarm means, and what to do."""
-    size = f"{alarm.change:+.3f} +- {alarm.sigma:.3f} {alarm.unit}"
+    unit = unit_of(alarm.change, alarm.sigma, unit=alarm.unit)
+    size = f"{unit.number(alarm.change, '+')} +- {unit.length(alarm.sigma)}"
     return (
         f"alarm: the first {alarm.records} records contradict an unchanged machine (score "
         f"{alarm.score:.1f}, by chance {alarm.limit:.1f} in one check of 100). If one part changed, it is "
@@ -142,7 +148,7 @@ def length_text(stated: LengthStatement) -> str:
         return "\n".join([*lines, wrapped(f"  the length check says nothing: {result.reason}", indent=2)])
     lines += [f"  {line}" for line in scale_lines(result)]
     if error is not None:
-        size = f"{error.value:.3f} mm, U {error.expanded:.3f} ({error.rule})"
+        size = f"{_size(error, 'mm')} ({error.rule('mm')})"
         lines.append(f"  position error by that at the task poses: {size}")
     largest = sorted(result.sources, key=lambda source: -source.um_m)[:NAMED_SOURCES]
     named = ", ".join(f"{source.name} {source.um_m:.1f}" for source in largest)

@@ -30,9 +30,6 @@ class LargestError:
     value: float
     expanded: float
 
-    def __str__(self) -> str:
-        return f"{self.value:.3f} +- {self.expanded:.3f}"
-
 
 @dataclass(frozen=True, eq=False)
 class TaskErrors:

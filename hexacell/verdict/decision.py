@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Literal
 from hexacell.cell.fields import Frozen, SixNumbers
 from hexacell.cell.measuring import AcceptanceSettings
 from hexacell.kinematics.parameters import JointUnit
+from hexacell.lengths import ShownUnit, unit_of
 from hexacell.results.result import LengthResult
 from hexacell.uncertainty.statement import LargestError, TaskErrors
 
@@ -84,11 +85,19 @@ class JudgedError(Frozen):
         factor = self.guard_band_factor
         return "" if factor == 1.0 or self.verdict is Verdict.PASS else f"{factor:g} U"
 
-    @property
-    def rule(self) -> str:
+    def shown_in(self, unit: str) -> ShownUnit:
+        """The unit in which people read it; ``unit`` is that of its figures."""
+        return unit_of(self.value, self.expanded, unit=unit)
+
+    def rule(self, unit: str) -> str:
         """The limit, and the guard band where it is named, in words."""
         guard_band = f", guard band {self.guard_band}" if self.guard_band else ""
-        return f"limit {self.limit:g}{guard_band}"
+        return f"limit {self.shown_in(unit).limit(self.limit)}{guard_band}"
+
+    def sentence(self, unit: str) -> str:
+        """The error +- its uncertainty with the rule, in words."""
+        shown = self.shown_in(unit)
+        return f"{shown.number(self.value)} +- {shown.length(self.expanded)} ({self.rule(unit)})"
 
 
 def worst_verdict(verdicts: Iterable[Verdict]) -> Verdict:

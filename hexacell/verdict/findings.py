@@ -7,6 +7,7 @@ from hexacell.identification.diagnostics.tolerance_check import ToleranceViolati
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
 from hexacell.kinematics.mechanism import FrameConvention
 from hexacell.kinematics.parameters import JointUnit
+from hexacell.lengths import shown
 from hexacell.noise.record_noise import NoiseLevel, NoiseLevels
 from hexacell.verdict.assessment import SEPARATED_PAIRS, Assessment
 
@@ -198,8 +199,8 @@ def _no_gain(assessed: Assessment) -> str:
     if scatter is None or accuracy is None:
         return ""
     return (
-        f"Recalibrating will not help: the machine repeats only to within {scatter.distance_mm:.3f} mm, "
-        f"and a better geometry would remove {accuracy.removable_mm:.3f} mm."
+        f"Recalibrating will not help: the machine repeats only to within {shown(scatter.distance_mm)}, "
+        f"and a better geometry would remove {shown(accuracy.removable_mm)}."
     )
 
 
@@ -208,7 +209,7 @@ def _poor_repeatability(assessed: Assessment) -> str:
     if scatter is None or assessed.does_not_repeat or not scatter.dominates(POOR_REPEATABILITY * noise_mm):
         return ""
     return (
-        f"On returning to a pose the ball is {scatter.distance_mm:.3f} mm off, "
+        f"On returning to a pose the ball is {shown(scatter.distance_mm)} off, "
         f"{scatter.distance_mm / noise_mm:.1f} times what the stated noise explains: look for play, "
         "slipping gauges or thermal drift."
     )

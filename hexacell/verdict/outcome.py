@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from hexacell.identification.identified_zeros import ParameterChoice
+from hexacell.lengths import from_to
 from hexacell.results.result import IdentificationResult, LengthResult
 from hexacell.verdict.decision import Verdict, VerifiedAccuracy, worst_verdict
 from hexacell.verdict.length_check import LengthStatement
@@ -22,7 +23,7 @@ def outcome_line(
         what = f"zeros only, {unknowns} of {what}"
     parts = [f"{what}, {result.records} records at {result.points} points"]
     if verified.before_mm is not None and verified.after_mm is not None:
-        means = f"{verified.before_mm:.2f} -> {verified.after_mm:.3f} mm"
+        means = from_to(verified.before_mm, verified.after_mm, 2)
         parts.append(f"mean deviation at held-out poses {means}")
     return outcome_of(parts, verified.accuracy, verified.verdict, reason_of(verified))
 
@@ -38,8 +39,7 @@ def outcome_of(
     if accuracy is not None:
         worst = worst_verdict(error.verdict for _, _, error in accuracy.errors)
         name, unit, error = next(one for one in accuracy.errors if one[2].verdict is worst)
-        size = f"{error.value:.3f} +- {error.expanded:.3f} {unit} ({error.rule})"
-        parts.append(f"{name} error at the task poses {size}")
+        parts.append(f"{name} error at the task poses {error.sentence(unit)}")
     because = f" ({reason})" if reason else ""
     return f"{'; '.join(parts)}: {verdict}{because}"
 
@@ -72,5 +72,5 @@ def length_line(stated: LengthStatement) -> str:
         return f"length check: {stated.verdict} ({result.reason})"
     parts = [f"length check over {result.distance_mm:.3f} mm: {scale_words(result)}"]
     if error is not None:
-        parts.append(f"position error by that {error.value:.3f} +- {error.expanded:.3f} mm ({error.rule})")
+        parts.append(f"position error by that {error.sentence('mm')}")
     return f"{'; '.join(parts)}: {stated.verdict}"

@@ -5,6 +5,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from hexacell.lengths import shown
 from hexacell.measurements.records import deviation_of
 from hexacell.noise.allowances import ReferenceChange
 from procedures.resources.run_resources import RunResources
@@ -38,7 +39,7 @@ class SetClosed(EventOfSet):
         drift = float(np.abs(self.drift_mm).max())
         line = (
             f"{self.at.name:24} {len(samples):2} records, "
-            f"largest deviation {largest:.3f} mm, drift {drift:.3f} mm"
+            f"largest deviation {shown(largest)}, drift {shown(drift)}"
         )
         return (
             f"{line}\n{self.at.name} ends with {len(samples)} records: {self.reason}"

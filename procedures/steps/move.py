@@ -12,6 +12,7 @@ from hexacell.cell.model import CellSettings
 from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.pose import Pose
+from hexacell.lengths import from_to
 from procedures.resources.run_resources import RunResources
 from procedures.run.cancellation import in_thread
 from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
@@ -130,7 +131,7 @@ class Move(StepAtPose):
 
     def activity(self) -> str:
         forecast = self.expected and self.expected.forecast
-        predicted = f": {forecast.now_mm:.3f} -> {forecast.end_mm:.3f} mm" if forecast else ""
+        predicted = f": {from_to(forecast.now_mm, forecast.end_mm)}" if forecast else ""
         return f"{self.at.pose_name(self.orientation)}{predicted}"
 
     async def perform(self, run: RunResources, state: RunState) -> BaseEvent:

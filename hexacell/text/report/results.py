@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from hexacell.identification.identified_zeros import ParameterChoice
+from hexacell.lengths import unit_of
 from hexacell.results.run_comparison import compare_results
 from hexacell.services.history.reported_run import ReportedRun
 from hexacell.services.history.run_summary import require_result
-from hexacell.text.identification import SMALLEST_BUDGET_LINE_MM
 from hexacell.text.parameters import ParameterRow, rows_of_changes, rows_of_run
 from hexacell.text.planning import quick_accuracy_sentences
 from hexacell.text.report.pages import Chapter, Paragraph, Picture, Table
@@ -77,14 +77,20 @@ def uncertainty_chapter(run: ReportedRun) -> Chapter | None:
     budget = run.document.get("uncertainty")
     if not budget:
         return None
-    rows = [("noise of the readings", "", f"{budget['noise_mm']:.3f}", "measured and stated")]
+    unit = unit_of(budget["standard_mm"])
+    rows = [("noise of the readings", "", unit.number(budget["noise_mm"]), "measured and stated")]
     rows += [
-        (line["name"], f"{line['size']:.3g} {line['unit']}", f"{line['combined_mm']:.3f}", line["source"])
+        (
+            line["name"],
+            f"{line['size']:.3g} {line['unit']}",
+            unit.number(line["combined_mm"]),
+            line["source"],
+        )
         for line in budget["lines"]
-        if line["combined_mm"] >= SMALLEST_BUDGET_LINE_MM
+        if line["combined_mm"] >= unit.smallest
     ]
-    rows.append(("standard uncertainty (root of the squares)", "", f"{budget['standard_mm']:.3f}", ""))
-    table = Table(("Cause", "size", "at the worst task pose, mm", "source"), tuple(rows))
+    rows.append(("standard uncertainty (root of the squares)", "", unit.number(budget["standard_mm"]), ""))
+    table = Table(("Cause", "size", f"at the worst task pose, {unit.name}", "source"), tuple(rows))
     unseen = [line["name"] for line in budget["lines"] if not line["visible"]]
     note = (Paragraph(f"No record shows these: {', '.join(unseen)}."),) if unseen else ()
     return Chapter("Uncertainty budget of the identified geometry", (table, *note))

@@ -5,6 +5,7 @@ In the order and words of ISO/IEC 17025:2017, 7.8, where they apply.
 
 from collections.abc import Iterator
 
+from hexacell.lengths import unit_of
 from hexacell.services.history.reported_run import ReportedRun
 from hexacell.services.history.run_summary import judged_accuracy
 from hexacell.text.report.pages import Block, Chapter, Facts, Paragraph, Table, Tone
@@ -49,8 +50,15 @@ def statement_chapter(run: ReportedRun) -> Chapter:
         meaning = f"{'Of the length scale alone: ' if is_of_length else ''}{VERDICT_MEANINGS[verdict]}"
     errors = () if accuracy is None else accuracy.errors
     rows = tuple(
-        (f"{name}, {unit}", f"{one.value:.3f}", f"{one.expanded:.3f}", f"{one.limit:g}", one.verdict.value)
+        (
+            f"{name}, {shown.name}",
+            shown.number(one.value),
+            shown.number(one.expanded),
+            shown.limit(one.limit),
+            one.verdict.value,
+        )
         for name, unit, one in errors
+        for shown in [one.shown_in(unit)]
     )
     title = "" if accuracy is None else f"Largest error at {accuracy.poses} task poses"
     blocks: list[Block] = [
@@ -146,15 +154,25 @@ def decision_rule(accuracy: VerifiedAccuracy | None) -> str:
 def _found_and_left_rows(run: ReportedRun) -> Iterator[tuple[str, str, str]]:
     verified = run.state.judged and run.state.judged.verification
     if verified and verified.before_mm is not None:
-        after = "-" if verified.after_mm is None else f"{verified.after_mm:.3f}"
         poses = len(run.state.held_out(Phase.AFTER))
-        name = f"mean deviation of the ball at {poses} held-out poses, mm"
-        yield name, f"{verified.before_mm:.3f}", after
+        name = f"mean deviation of the ball at {poses} held-out poses"
+        yield _before_after(name, verified.before_mm, verified.after_mm)
     identified, accuracy = run.state.identified, judged_accuracy(run.state.judged)
     if identified is not None and identified.improvement is not None:
-        after = "-" if accuracy is None else f"{accuracy.position.value:.3f}"
-        name = "largest position error at the task poses, mm"
-        yield name, f"{identified.improvement.now_mm:.3f}", after
+        after = None if accuracy is None else accuracy.position.value
+        yield _before_after(
+            "largest position error at the task poses", identified.improvement.now_mm, after
+        )
+
+
+def _before_after(name: str, before_mm: float, after_mm: float | None) -> tuple[str, str, str]:
+    """A row of a length before and after, in the unit of the smaller one."""
+    unit = unit_of(before_mm if after_mm is None else after_mm)
+    return (
+        f"{name}, {unit.name}",
+        unit.number(before_mm),
+        "-" if after_mm is None else unit.number(after_mm),
+    )
 
 
 def _left(run: ReportedRun) -> str:

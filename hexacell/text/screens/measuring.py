@@ -4,6 +4,7 @@ from itertools import pairwise
 from statistics import median
 
 from hexacell.cell.model import CellSettings
+from hexacell.lengths import from_to
 from hexacell.run_process.messages import HostFailed
 from hexacell.text.layout import duration
 from hexacell.text.screens.run_picture import RunPicture, Setback
@@ -182,7 +183,7 @@ def accuracy_plot(picture: RunPicture, target_mm: float | None) -> PlotView:
     title = "Accuracy, as predicted"
     if picture.forecasts:
         last = picture.forecasts[-1][1]
-        title = f"Accuracy {last.now_mm:.3f}->{last.end_mm:.3f} mm"
+        title = f"Accuracy {from_to(last.now_mm, last.end_mm).replace(' -> ', '->')}"
     return PlotView(
         title=title,
         x_label="records",

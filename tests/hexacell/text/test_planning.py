@@ -14,7 +14,7 @@ from hexacell.measurements.csv_file import write_measurements
 from hexacell.measurements.records import MeasurementSet
 from hexacell.noise.measured_noise import AveragingForecast
 from hexacell.services.offline import PlanTrial
-from hexacell.text.planning import forecast_text, plan_trial_lines
+from hexacell.text.planning import forecast_text, plan_trial_lines, run_forecast_line
 
 FORECAST = Forecast(now_mm=0.31, next_mm=0.29, end_mm=0.06, records=24, minutes=12.4)
 
@@ -32,6 +32,14 @@ def test_a_forecast_says_what_records_gain_and_u_where_the_effects_are_known():
     text = forecast_text(known)
     assert "0.310 mm (one sigma), U 0.640 mm with the systematic effects;" in text
     assert text.endswith("continuing gains 0.250 mm, U 0.200 mm then in 24 records, about 12 minutes.")
+
+
+def test_errors_of_micrometres_are_in_um():
+    precise = Forecast(now_mm=0.0123, next_mm=0.004, end_mm=0.0009, records=24, minutes=12.4)
+    text = forecast_text(precise.model_copy(update={"systematic_mm": 0.0005}))
+    assert "0.012 mm (one sigma), U 0.025 mm with" in text
+    assert "U 2.06 um then in 24 records" in text
+    assert run_forecast_line(precise) == "  predicted error at the task 4.00 um; in 12 minutes 0.90"
 
 
 def lines(target_mm=None, **changes):

@@ -1,7 +1,8 @@
 """From a series at standstill and visits of one pose to the noise that a run counts with.
 
-A standstill shows the part from reading to reading alone: it replaces what is stated of a record only
-where it is significantly larger. What the visits show beyond the stated noise is added to its source.
+A standstill shows the part from reading to reading alone, with the rounding of the displays. What is
+stated of a record is mostly the other part, which stays as long as the robot stands; of an instrument whose
+readings scatter nearly as much as that, both count. What the visits show beyond is added to its source.
 Where the cell file allows it, less than stated counts as well, by the upper limit of what the visits
 show. The mean of more readings is better in the part from reading to reading, and in no other.
 """
@@ -18,7 +19,7 @@ from hexacell.campaign.planner import Plan
 from hexacell.identification.problem.prior import Noise
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.pose import Pose
-from hexacell.kinematics.rotations import Array
+from hexacell.kinematics.rotations import Array, Mask
 from hexacell.noise.approach_scatter import RepeatedApproaches, approach_scatter
 from hexacell.noise.ball_by_encoders import BallByEncoders
 from hexacell.noise.measured_noise import (
@@ -31,6 +32,9 @@ from hexacell.noise.standstill import SIGNIFICANCE, ReadingNoise, reading_noise
 
 INSTRUMENTS = 9
 """Three gauges and six encoders, which share the significance of one test."""
+
+LEAST_SHARE = 0.3
+"""Of what is stated, from which the readings count beside it: less would make it larger by 5 % at most."""
 
 WINDOWS = (1, 2, 4, 8, 16)
 """Numbers of windows that are compared."""
@@ -111,7 +115,7 @@ class _NoiseAssessment:
 
     @cached_property
     def scatter(self) -> RepeatedApproaches | None:
-        """What the visits show beyond the larger of stated noise and that of the readings."""
+        """What the visits show beyond the stated noise and that of the readings."""
         robot, visits, least = self.plan.robot, self.readings.visits, self._at_least(self.stated)
         command = robot.from_commands([self.readings.reference])
         ball = BallByEncoders.at(robot, robot.belief(), command)
@@ -137,22 +141,24 @@ class _NoiseAssessment:
         return np.asarray(np.sqrt(np.maximum(one**2 - first**2, 0.0) + mean**2))
 
     def _at_least(self, sigma: Array) -> Array:
-        """Noise (9,) that is no smaller than that of the readings, where these prove it larger."""
+        """Noise (9,) with that of the readings, where these prove that it matters."""
+        matters, count = self._readings_exceed(LEAST_SHARE * sigma), self.readings.window_readings
+        readings = [noise.of_mean(count) for noise in self.reading_noise]
+        return np.hypot(sigma, np.where(matters, readings, 0.0)) if readings else sigma
+
+    def _readings_exceed(self, sigma: Array) -> Mask:
+        """Of which instruments (9,) the readings alone make a record noisier than ``sigma`` (9,)."""
         if not self.reading_noise:
-            return sigma
-        count = self.readings.window_readings
-        significance = SIGNIFICANCE / INSTRUMENTS
-        larger = [
-            noise.of_mean(count) if noise.exceeds(mm, count, significance) else mm
-            for noise, mm in zip(self.reading_noise, sigma.tolist(), strict=True)
-        ]
-        return np.array(larger)
+            return np.zeros(INSTRUMENTS, dtype=bool)
+        count, significance = self.readings.window_readings, SIGNIFICANCE / INSTRUMENTS
+        each = zip(self.reading_noise, sigma.tolist(), strict=True)
+        return np.array([noise.exceeds(mm, count, significance) for noise, mm in each])
 
     def _instruments(self, records: Array) -> Iterator[InstrumentNoise]:
         gauges = sorted(self.plan.settings.gauges, key=lambda gauge: gauge.axis)
         names = [*(f"gauge {one.name}" for one in gauges), *(f"encoder {leg}" for leg in range(1, 7))]
         units = [JointUnit.MM] * 3 + [self.plan.robot.mechanism.words.joint_unit] * 6
-        larger = self._at_least(self.stated) > self.stated
+        larger = self._readings_exceed(self.stated)
         for row, (name, unit) in enumerate(zip(names, units, strict=True)):
             yield InstrumentNoise(
                 name=name,

@@ -51,10 +51,10 @@ class OutlierRecord(Frozen):
 class IdentificationResult(Frozen):
     """The identified geometry and its uncertainty: the first part of ``result.json``.
 
-    ``expected_chi2`` is the mean of ``chi2`` if model and noise are right, where an earlier result, or the
-    tolerances of what is held, take part in the estimate; where only the drawing does, it is None, and that
-    mean is ``dof``. ``identifies`` says which parameters are identified; the others are as the controller
-    has them, with their tolerances as sigma.
+    ``expected_chi2`` is the mean of ``chi2`` if model and noise are right: ``dof``, and more where
+    tolerances or an earlier result determine parameters. Older journals have it for the latter only, else
+    None. ``identifies`` says which parameters are identified; the others are as the controller has them,
+    with their tolerances as sigma.
     """
 
     converged: bool
@@ -94,7 +94,7 @@ class IdentificationResult(Frozen):
             undetermined=kept.undetermined,
             outliers=tuple(OutlierRecord.of(record, fault) for record, fault in found.left_out),
             frame=found.problem.mechanism.convention.name,
-            expected_chi2=found.goodness.expected if found.problem.prior.is_estimate or zeros else None,
+            expected_chi2=found.goodness.expected,
             noise_freedom=None if np.isinf(found.problem.noise.freedom) else found.problem.noise.freedom,
             identifies=ParameterChoice.ALL if zeros is None else ParameterChoice.ZEROS,
         )

@@ -157,18 +157,16 @@ def test_longer_readings_help_against_noise_from_reading_to_reading_alone(plan) 
     from_stops = assess_noise(allowing(plan, averaged_windows=16), readings(plan))
     assert from_stops.windows == 1
     assert from_readings.windows > 1
-    expected = STATED / np.sqrt(from_readings.windows)
-    # A series of 40 does not exclude that a part of what is stated differs from record to record.
-    assert (records_of(from_readings) > 0.75 * expected).all()
-    assert (records_of(from_readings) < 0.8 * STATED).all()
-    assert np.median(records_of(from_readings)) < 0.6 * STATED
+    # The series does not show how much of what is stated differs from record to record: it may be all.
+    expected = STATED * np.sqrt(1.0 + 1.0 / from_readings.windows)
+    assert records_of(from_readings) == pytest.approx(np.full(9, expected), rel=0.1)
 
 
 def test_longer_readings_are_not_taken_where_the_cell_file_does_not_allow_them(plan) -> None:
     measured = assess_noise(plan, readings(plan, white=np.sqrt(WINDOW) * STATED))
     assert measured.windows == 1
     first, second = measured.forecasts[:2]
-    assert second.error_mm < 0.85 * first.error_mm
+    assert second.error_mm < 0.9 * first.error_mm
     assert second.minutes == pytest.approx(55 * 0.6 / 60.0)
 
 

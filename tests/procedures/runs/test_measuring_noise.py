@@ -192,8 +192,8 @@ AVERAGED = ASKED | {
     "noise__averaged_windows": 4,
     "simulation__gauges__flicker_mm": 0.01,
     "simulation__encoders__flicker": 0.01,
-    "noise__encoder": 0.0045,
-    "noise__gauge_mm": 0.0045,
+    "noise__encoder": 0.002,
+    "noise__gauge_mm": 0.002,
 }
 
 

@@ -27,6 +27,7 @@ from hexacell.identification.data_faults.hypotheses import (
     ZeroShiftHypothesis,
     rank_hypotheses,
 )
+from hexacell.identification.data_faults.stepwise_selection import SHOWN_DECREASE
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.measurement_model import NuisanceElimination
 from hexacell.identification.solver.result import Identification
@@ -114,9 +115,12 @@ def _lost_place(test: ExcessTest) -> Iterator[PossibleCause]:
 
 
 def _of_the_records(test: ExcessTest) -> Iterator[PossibleCause]:
-    """The most likely data fault of each kind, if it is significant."""
+    """The most likely data fault of each kind, if it is significant and the records can show it."""
     kinds: set[type[FaultHypothesis]] = set()
+    shown = (1.0 - 1.0 / SHOWN_DECREASE) * test.found.noise_test.chi2
     for hypothesis in rank_hypotheses(test.found.problem, test.found):
+        if isinstance(hypothesis, GaugeFaultHypothesis) and hypothesis.gain < shown:
+            continue
         if type(hypothesis) not in kinds:
             kinds.add(type(hypothesis))
             share = test.share_of_gain(hypothesis.gain, hypothesis.unknowns)

@@ -18,7 +18,9 @@ from hexacell.identification.estimator import identify
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
 from hexacell.identification.solver.fit import fit_regularized
 from hexacell.identification.solver.result import DataFaultKind, GaugeFaultError
+from hexacell.uncertainty.possible_causes import possible_causes
 from tests.hexacell.altered_records import altered
+from tests.hexacell.conftest import ACTUAL
 
 
 def with_encoders(measurements, error):
@@ -179,3 +181,12 @@ def test_a_trial_that_leaves_an_imperfect_machine_settles_the_search(
     wrong = make_problem(with_encoders(noisy, waves(5, 0.1)))
     wrong = wrong if before is None else before.corrected(wrong)
     assert after.settles(CorrectedFit(wrong, wrong, fit_regularized(wrong))) is settled
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_gauge_is_blamed_where_deviations_are_near_zero(visit, make_problem, seed):
+    """A calibrated machine with a little of everything: reversed readings would be nearly the same."""
+    records = visit(ACTUAL, ACTUAL, degrees=20.0, seed=seed).measured(0.01, seed)
+    found = identify(make_problem(with_encoders(records, waves(seed, 0.03))))
+    assert found.data_faults == ()
+    assert not [one.name for one in possible_causes(found) if one.name.startswith("reversed")]

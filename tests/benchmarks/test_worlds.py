@@ -5,17 +5,21 @@ and stated with the uncertainty budget of their machine; what they really do at 
 """
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from hexacell.cell.uncertainty import Grade
+from hexacell.identification.estimator import identify
+from hexacell.uncertainty.effect_kinds import own_weight
 from hexacell.verdict.decision import Verdict
 from tests.benchmarks.figures import NEVER, at_most, between, least_by_chance, most_by_chance
 from tests.benchmarks.machines import on_all_cores
 from tests.benchmarks.samples import sample
-from tests.benchmarks.worlds.kinds import KINDS, NONE, ORDINARY, PRECISION
-from tests.benchmarks.worlds.trials import Outcome, Trial, carry_out, settings
+from tests.benchmarks.worlds import budgets
+from tests.benchmarks.worlds.kinds import DOWN, KINDS, NONE, ORDINARY, PRECISION
+from tests.benchmarks.worlds.trials import Outcome, Trial, carry_out, settings, world_of
 
 RUNS = sample(__name__, "RUNS")
 DRAWN = 30
@@ -81,3 +85,32 @@ def test_no_machine_beyond_the_budget_passes_that_records_show_to_be_wrong(figur
     figure("false passes, effects that records can show", false_passes(shown), f"of {of}", most)
     named = at_most(most_by_chance(0.01, len(swept)))
     figure("causes named wrongly", wrongly_named(swept), f"of {len(swept)}", named)
+
+
+WEIGHTS, QUIET_MM = 23, 0.003
+"""Machines under 100 N, measured with so little noise that the records show how their legs yield."""
+
+
+def is_doubtful(number: int, um_per_n: float, *, stated: bool) -> bool:
+    """Whether residuals of a healthy machine are too large, or records of it are called false."""
+    world, own = world_of(Trial("legs elastic, 100 N", um_per_n / 0.03, number, "ideal"))
+    noise = replace(own.robot.noise, alignment=0.0, gauge_scale=0.0, encoder=QUIET_MM, gauge_mm=QUIET_MM)
+    effects = budgets.machine("ideal")
+    if stated:
+        effects = (*effects, own_weight(100.0, um_per_n, own.robot.frames.base @ DOWN))
+    robot = replace(own.robot, noise=noise, effects=effects)
+    records = replace(world, robot=replace(world.robot, noise=noise)).records(
+        own.commands, robot.commanding
+    )
+    found = identify(robot.problem(records))
+    return bool(found.data_faults) or not found.goodness.is_explained
+
+
+def test_no_healthy_machine_is_doubtful_whose_weight_is_stated(figure):
+    for um_per_n in (0.03, 0.05):
+        without, known = (
+            sum(is_doubtful(number, um_per_n, stated=stated) for number in range(WEIGHTS))
+            for stated in (False, True)
+        )
+        figure(f"doubtful, 100 N at {um_per_n:g} um/N, not stated", without, f"of {WEIGHTS}")
+        figure("  stated", known, f"of {WEIGHTS}", NEVER)

@@ -406,7 +406,8 @@ def _proven_faults(
     selected: CorrectedFit, tests: Mapping[RecordId, DeletionTest]
 ) -> tuple[FaultHypothesis, ...]:
     """The faults of a fit that the rest of its records proves; ``tests`` are those of the left-out ones."""
-    rest = selected.fit.goodness
+    # Of the noise alone, as the statistics of the faults are: stated effects explain the rest, not them.
+    rest = selected.fit.noise_test
     can_prove = selected.fit.problem.is_overdetermined
     records = {
         record: tests[record].significance if can_prove or tests[record].is_certain else 0.0

@@ -6,11 +6,13 @@ import threading
 from procedures.journal.journal import read_entries
 
 CHECK = ("--mode", "check", "--unattended")
+SHORT = ("budget_records = 40", "budget_records = 4")
 
 
 def test_each_event_is_a_line_as_in_the_journal(typed_here, quick_cell, few_candidates, tmp_path) -> None:
     target = tmp_path / "events.jsonl"
     target.write_text("of yesterday\n")
+    quick_cell.edit(SHORT)
     typed_here("run", quick_cell.cell, *CHECK, "--events", target)
     written = b"".join((run / "journal.jsonl").read_bytes() for run in quick_cell.runs())
     assert target.read_bytes() == written
@@ -31,6 +33,7 @@ def test_a_reader_that_leaves_does_not_end_the_run(
 ) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
+    quick_cell.edit(SHORT)
     ready = threading.Event()
 
     def read_one_line() -> None:

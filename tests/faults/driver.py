@@ -27,12 +27,12 @@ import hexacell.cli.commands.simulate
 from drivers.simulated import cell as simulated_cell
 from drivers.simulated import robot
 from hexacell.cli.app import main
-from hexacell.design.search_effort import SearchEffort
 from hexacell.plugins import Group, load
 from hexacell.services import search_effort
 from procedures.journal import journal
 from tests.faults.interception import Failing, intercepted
 from tests.faults.steps import pull_out
+from tests.small_cell import FEW_CHOICES
 
 UNEXPECTED = 70
 """The exit code for an error that the program did not expect."""
@@ -88,7 +88,7 @@ def serve() -> None:
         (Group.CONFIG_FORMATS, "toml"),
     ):
         load(group, name)
-    search_effort.EFFORT = SearchEffort(candidates=64, held_out_candidates=64)
+    search_effort.EFFORT = FEW_CHOICES
     robot.LINE_STEPS = 8
     scipy.stats.qmc.Sobol(3).random(2)  # which reads a file that not everybody may read
     print("ready", flush=True)

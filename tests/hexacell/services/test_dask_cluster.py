@@ -103,6 +103,7 @@ def test_a_scheduler_that_goes_away_is_named_and_what_was_done_is_told(cluster, 
     assert all(done[key] == int(key) ** 2 for key in done)
 
 
+@pytest.mark.slow
 def test_workers_that_all_leave_are_missed(cluster, tmp_path: Path) -> None:
     started = results_of({"3": 3}, square, dask_cluster(cluster.address, patience_s=LATE_S))
     assert dict(started) == {"3": 9}

@@ -8,7 +8,7 @@ import pytest
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.limits import ExclusionSettings
 from hexacell.cell.loader import Cell, load_cell
-from hexacell.errors import ExitCode, FileError, Interruption, UsageError
+from hexacell.errors import FileError, Interruption, UsageError
 from hexacell.kinematics.pose import Pose
 from hexacell.services.preflight import toggle_exclusion
 from hexacell.services.run.calibration_run import calibrate
@@ -45,10 +45,9 @@ async def test_others_are_measured_in_their_place_and_points_are_left(
             queue.put(Abort())
 
     changes = {"operator": approver, "unattended": False}
-    with pytest.raises(Interruption):
-        await calibrate(site.order(**changes), [stop_early], queue)
-    ended = await site.calibrate(resume=True, **changes)
-    assert ended.exit_code == ExitCode.DONE, ended.line
+    for resume in (False, True):
+        with pytest.raises(Interruption):
+            await calibrate(site.order(resume=resume, **changes), [stop_early], queue)
     begun = site.happened(events.StepBegun)
     commanded = [event.step.pose for event in begun if isinstance(event.step, Move)]
     assert commanded

@@ -9,10 +9,23 @@ from hexacell.cell.recovery import Action
 from hexacell.cell.simulation import FaultKind
 from hexacell.errors import ExitCode
 from procedures.devices.reconnection import DeviceReplaced
+from procedures.engine.engine import Listener
 from procedures.run.trips import RobotNotStopped
 from procedures.steps import events
 
 UNPLUGGED: FaultKind = "unplugged"
+
+
+class Enough(Exception):
+    """What was to be seen has happened."""
+
+
+def enough(kind: type[Any]) -> Listener:
+    def listener(event: events.Event, _: object) -> None:
+        if isinstance(event, kind):
+            raise Enough
+
+    return listener
 
 
 def pulled_out(site: Any, kind: FaultKind, device: str, step: str) -> Any:
@@ -48,8 +61,8 @@ async def test_an_unplugged_device_that_is_plugged_in_again_is_recovered(
     at_second_point, kind, device, step, voids
 ) -> None:
     site = at_second_point
-    ended = await site.calibrate(pulled_out(site, kind, device, step), resume=True)
-    assert ended.exit_code == ExitCode.DONE, ended.line
+    with pytest.raises(Enough):
+        await site.calibrate(pulled_out(site, kind, device, step), enough(events.SetClosed), resume=True)
     failures = site.happened(events.Failed)
     assert failures
     assert all(failure.action is not Action.ABORT for failure in failures)
@@ -69,16 +82,8 @@ async def test_a_robot_that_cannot_be_stopped_ends_the_run_without_recovery(at_s
         await site.calibrate(pull, resume=True)
     assert not site.happened(events.Failed)
     site.simulated.faults.clear(UNPLUGGED, "controller")
-
-    class Enough(Exception):
-        pass
-
-    def enough(event: events.Event, _: object) -> None:
-        if isinstance(event, events.RecordTaken):
-            raise Enough
-
     with pytest.raises(Enough):
-        await site.calibrate(enough, resume=True)
+        await site.calibrate(enough(events.RecordTaken), resume=True)
 
 
 async def test_another_device_than_the_run_was_begun_with_is_refused(finished, make_site) -> None:

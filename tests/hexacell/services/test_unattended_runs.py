@@ -135,12 +135,12 @@ async def test_the_run_is_told_when_its_time_is_over(make_cell) -> None:
 async def test_it_ends_at_its_reference_and_can_be_resumed(make_site, finished) -> None:
     """With the same records and the same config, byte for byte, as a run that had the time."""
     site, queue, counted = make_site(), CommandQueue(), 0
-    site.write(finished.until(events.SetClosed), finished)
+    site.write(finished.until(events.RecordTaken, count=18), finished)
 
     def count(event: events.Event, _: object) -> None:
         nonlocal counted
         counted += isinstance(event, events.RecordTaken)
-        if counted == 5:
+        if counted == 2:
             queue.put(EndAtReference("it lasted longer than longest_minutes = 1"))
 
     before = site.config

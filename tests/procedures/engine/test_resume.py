@@ -161,7 +161,7 @@ async def interrupted_twice(rig: Any, how: str, first: int, second: int) -> None
     assert set(voided) <= {"the run was interrupted in this set"}, "no set with a record was measured anew"
 
 
-@pytest.mark.sample("3", "16")
+@pytest.mark.sample("3")
 @pytest.mark.parametrize("first", range(1, TELLING))
 async def test_a_run_interrupted_after_any_event_and_again_finishes_with_every_record_once(make_rig, first):
     how = list(WAYS)[first % 2]

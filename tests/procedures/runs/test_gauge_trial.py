@@ -144,7 +144,7 @@ async def test_no_record_leaves_the_room_of_gauges_zeroed_off_the_middle(make_ri
     rig = make_rig(simulation__gauges__placing_mm=0.0)
     for gauge, off_mm in zip(rig.gauges, (0.9, -0.9, 0.9), strict=True):
         off_the_middle(gauge, off_mm)
-    await run_until(rig, events.Identified)
+    await run_until(rig, events.SetClosed)
     assert not happened(rig, events.RecordRejected)
     for taken in happened(rig, events.RecordTaken):
         assert np.abs(taken.reading.gauges_mm).max() <= 5.0, "beyond the plates"

@@ -291,7 +291,7 @@ async def interrupted(rig: Rig, number: int, command: Abort | None) -> None:
 FAILING = (Standstill, Pilot, Repeat)
 
 
-@pytest.mark.sample("retry-Repeat", "redo-set-Standstill")
+@pytest.mark.sample("redo-set-Repeat")
 @pytest.mark.parametrize("kind", FAILING)
 @pytest.mark.parametrize("action", ["retry", "measure-again", "redo-set"])
 async def test_a_device_that_fails_meanwhile_costs_no_more_than_its_recovery(asked, kind, action):

@@ -56,7 +56,7 @@ async def test_a_point_whose_reference_is_refused_is_left(make_rig) -> None:
     rig = make_rig(
         **limits(y=(-120.0, 120.0)), identification__points=POINTS, identification__orientations=7
     )
-    await run_until(rig, events.Identified)
+    await run_until(rig, events.SetClosed, count=2)
     (refusal,) = [one for one in excluded(rig) if one.orientation == 1]
     assert (refusal.at.phase, refusal.at.point) == (Phase.IDENTIFY, 2)
     keys = {taken.at for taken in happened(rig, events.RecordTaken)}

@@ -3,12 +3,13 @@
 import asyncio
 import contextlib
 import fnmatch
+import inspect
 import os
 import re
 import signal
 import threading
 import time
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -81,7 +82,21 @@ def nothing_left_open() -> Iterator[None]:
 
 
 @pytest.fixture(autouse=True)
-async def no_task_left_running(nothing_left_open: None) -> AsyncIterator[None]:
+def no_task_left_running(nothing_left_open: None, request: pytest.FixtureRequest) -> None:
+    """For tests with an event loop: to make one for each of the others takes longer than most of them."""
+    item = request.node
+    if isinstance(item, pytest.Function):
+        fixtures = (found[-1].func for found in item._fixtureinfo.name2fixturedefs.values())
+        if any(map(_is_asynchronous, (item.function, *fixtures))):
+            request.getfixturevalue("watched_tasks")
+
+
+def _is_asynchronous(function: Callable[..., object]) -> bool:
+    return inspect.iscoroutinefunction(function) or inspect.isasyncgenfunction(function)
+
+
+@pytest.fixture
+async def watched_tasks() -> AsyncIterator[None]:
     """Fail a test whose tasks outlive it and its fixtures; the event loop would cancel them unseen."""
     yield
     give_up = time.monotonic() + GRACE_S

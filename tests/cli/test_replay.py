@@ -25,16 +25,15 @@ def manipulated(demo, tmp_path):
 
 def test_a_manipulated_journal_is_different_and_the_record_is_named(typed_here, manipulated):
     path, line = manipulated
-    outcome = typed_here("replay", path, "--only", "results")
+    outcome = typed_here("replay", path, "--only", "results", "--json")
     assert outcome.code == 1
-    first, *others, verdict = outcome.out.splitlines()
+    first, *others, verdict = outcome.err.splitlines()
     assert first == f"NO  line {line}, judge: verdict: recorded fail, replayed pass"
     assert others[0].startswith(f"--  line {line}, judge: line: recorded Not at all., replayed ")
     assert verdict.endswith(f": different, first in line {line} (judge)")
-    assert max(map(len, outcome.out.splitlines())) <= 80
-    found = typed_here("replay", path, "--only", "results", "--json").document
-    assert found["same"] is False
-    assert [one["counts"] for one in found["differences"]][:2] == [True, False]
+    assert max(map(len, outcome.err.splitlines())) <= 80
+    assert outcome.document["same"] is False
+    assert [one["counts"] for one in outcome.document["differences"]][:2] == [True, False]
     alone = typed_here("replay", path, "--only", "identification")
     assert (alone.code, alone.out.startswith("0 decisions and 1 results of ")) == (0, True)
 

@@ -100,6 +100,7 @@ class TestAPersonAtTheTerminal:
         assert "left without an answer" in terminal.shown
         assert cell.controller.read_bytes() == (demo.run / "config-before").read_bytes()
 
+    @pytest.mark.slow
     def test_places_gauges_and_is_asked_how_to_go_on_after_a_fault(self, quick_cell, start, terminal):
         fixed = ("[guards]", '[guards]\nlimits = "fixed"')
         quick_cell.edit(BY_HAND, ("[acceptance]", "[acceptance]\ndrift_mm = 0.00001"), fixed)

@@ -10,7 +10,7 @@ from tests.mutations.kinds import SHARES
 from tests.mutations.sound_cells import few_choices, make_templates
 from tests.mutations.trials import Templates
 
-SAMPLE, EACH = 2, 20
+SAMPLE, EACH = 1, 20
 """Trials of each kind in ``make test`` and in ``make test-full``."""
 
 

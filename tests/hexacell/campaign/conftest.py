@@ -12,6 +12,7 @@ from hexacell.campaign.planner import Plan
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.checks.check import Check, identified_before
+from hexacell.design.candidate_refinement import QUICK
 from hexacell.design.search_effort import SearchEffort
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
@@ -19,7 +20,7 @@ from hexacell.robot.model import Robot, config_layout, make_robot
 from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.verdict.decision import ErrorLimits
 
-FEW = SearchEffort(candidates=64, dry_run_robots=1)
+FEW = SearchEffort(candidates=64, dry_run_robots=1, rounds=QUICK)
 TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
 MakePlan = Callable[..., Plan]
 

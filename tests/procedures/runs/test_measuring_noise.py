@@ -146,7 +146,7 @@ def test_the_quiet_simulation_is_as_noisy_as_stated(quiet: Rig) -> None:
     assert 0.4 < found.approaches.ratio < 1.5
 
 
-async def test_a_noisy_gauge_is_named_and_weighted_down(asked: Rig) -> None:
+async def test_a_noisy_gauge_is_named_and_weighted_down(asked: Rig, well_known: None) -> None:
     noisy(asked, 1, 0.012)
     found = await measure_noise(asked)
     assert [one.name for one in found.noise.gauges if one.is_noisier] == ["gauge y"]
@@ -157,7 +157,7 @@ async def test_a_noisy_gauge_is_named_and_weighted_down(asked: Rig) -> None:
     assert asked.calibration.robot.noise.gauges_mm == pytest.approx(np.full(3, 0.0012))
 
 
-async def test_a_drifting_gauge_is_named_and_is_no_noise(asked: Rig) -> None:
+async def test_a_drifting_gauge_is_named_and_is_no_noise(asked: Rig, well_known: None) -> None:
     shown = asked.gauges[2].shown
     asked.gauges[2].shown = lambda: shown() + 0.003 * asked.clock.now()
     found = await measure_noise(asked)
@@ -197,7 +197,7 @@ AVERAGED = ASKED | {
 }
 
 
-async def test_records_are_means_of_several_windows_where_that_is_allowed_and_pays(make_rig):
+async def test_records_are_means_of_several_windows_where_that_is_allowed_and_pays(make_rig, well_known):
     rig = make_rig(**AVERAGED)
     found = await measure_noise(rig)
     assert found.noise.windows == 4

@@ -49,7 +49,8 @@ def drawn(stated: Iterable[StatedEffect], factor: float, random: Random) -> Effe
     Raises:
         KeyError: there is no such effect here.
     """
-    return at_once(*(_DRAWS[effect.name](factor * effect.size, random) for effect in stated))
+    sized = (effect for effect in stated if effect.size)
+    return at_once(*(_DRAWS[effect.name](factor * effect.size, random) for effect in sized))
 
 
 def _directions(mrad: float, random: Random) -> Effect:

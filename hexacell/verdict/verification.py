@@ -40,31 +40,33 @@ from hexacell.verdict.model_evidence import (
 
 @dataclass(frozen=True, slots=True)
 class DeviationStatistics:
-    """Mean distance of the ball from its point's reference, mm, over a number of poses."""
+    """Mean distance of the ball from its point's reference, mm, over poses with so many references."""
 
     mean_mm: float
     poses: int
+    references: int = 1
 
     @classmethod
-    def of(cls, deviations: ArrayLike) -> DeviationStatistics | None:
-        """Statistics of deviations (n, 3), mm, without the references.
+    def of(cls, deviations: ArrayLike, references: int = 1) -> DeviationStatistics | None:
+        """Statistics of deviations (n, 3), mm, without the references, which as many poses have each.
 
         None without any, or if one is not finite.
         """
         distances: Array = np.linalg.norm(np.reshape(np.asarray(deviations, dtype=float), (-1, 3)), axis=-1)
         if not len(distances) or not np.isfinite(distances).all():
             return None
-        return cls(float(distances.mean()), len(distances))
+        return cls(float(distances.mean()), len(distances), references)
 
 
 def is_worse(before: DeviationStatistics, after: DeviationStatistics, noise: Noise) -> bool:
     """Whether the mean distance is significantly larger than before, at the same poses.
 
-    A mean of n distances to one noisy reference has at most the variance of a record, once for the
-    reference and 1/n for the poses.
+    A mean of n distances to p noisy references has at most 1/p of the variance of a record for the
+    references, and 1/n for the poses.
     """
     record_mm = float(np.sqrt(noise.gauge_mm**2 + noise.encoder**2 + noise.stops**2))
-    standard_error = record_mm * float(np.sqrt(2.0 + 1.0 / before.poses + 1.0 / after.poses))
+    shares = [1.0 / one.references + 1.0 / one.poses for one in (before, after)]
+    standard_error = record_mm * float(np.sqrt(sum(shares)))
     return after.mean_mm - before.mean_mm > SIGNIFICANT_SIGMAS * standard_error
 
 
@@ -135,7 +137,8 @@ def verify(settings: CellSettings, robot: Robot, found: Identification, held_out
         IdentifiabilityError: no geometry fits any held-out record, or those of the length check are of
             other poses.
     """
-    before, after = DeviationStatistics.of(held_out.before), DeviationStatistics.of(held_out.after)
+    points = max(1, len(held_out.records.counts) // 2)  # each in both phases
+    before, after = (DeviationStatistics.of(one, points) for one in (held_out.before, held_out.after))
     if held_out.left_travel:
         return Verification(verdict=Verdict.FAIL, before_mm=before and before.mean_mm, is_worse=True)
     if before is None or after is None:

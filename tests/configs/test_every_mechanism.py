@@ -14,7 +14,8 @@ from hexacell.kinematics.sensitivity import singularity_margin
 from hexacell.robot.model import Robot, robot_of
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-OTHERS = ["gough-stewart", "linapod", "rotary-cranks", "linuxcnc-hexapod/cell"]
+PUBLISHED = ["camera-hexapod", "wpi-hexapod"]
+OTHERS = ["gough-stewart", "linapod", "rotary-cranks", "linuxcnc-hexapod/cell", *PUBLISHED]
 NAMES = [*OTHERS, "simulated-hexaglide", "paper-experiment"]
 NOT_THEIRS = re.compile(r"\b(slider|rail|hexaglide)", re.IGNORECASE)
 

@@ -153,15 +153,17 @@ def test_worse_means_significantly_worse(before, after, worse):
     assert is_worse(before, after, NOISE) is worse
 
 
-def noisy(random):
-    """Deviations of a robot that returns exactly, with the noise of records and of their reference."""
-    readings = 0.014 * random.standard_normal((13, 3))
-    return DeviationStatistics.of(readings[1:] - readings[0])
+def noisy(random, points):
+    """Deviations of a robot that returns exactly, with the noise of records and of their references."""
+    readings = 0.014 * random.standard_normal((points, 13, 3))
+    return DeviationStatistics.of(readings[:, 1:] - readings[:, :1], points)
 
 
-def test_noise_alone_is_hardly_ever_worse():
+@pytest.mark.parametrize("points", [1, 3])
+def test_noise_alone_is_hardly_ever_worse(points):
     random = np.random.default_rng(5)
-    assert sum(is_worse(noisy(random), noisy(random), NOISE) for _ in range(2000)) <= 4
+    worse = [is_worse(noisy(random, points), noisy(random, points), NOISE) for _ in range(2000)]
+    assert sum(worse) <= 4
 
 
 @pytest.mark.parametrize(

@@ -38,16 +38,30 @@ class VirtualRobot:
     Attributes:
         model: what is known of it: mechanism, commanding geometry, noise and limits.
         truth: its geometry, in the mechanism's frame convention.
+        stops: one standard deviation of where a joint stops beside its command, as its encoder shows it, in
+            its unit; by default what the model's noise states.
+        unseen: likewise beside what its encoder shows.
         smallest_margin: the smallest singularity margin of the true geometry along all moves so far.
     """
 
-    def __init__(self, model: Robot, truth: Geometry, random: np.random.Generator | None = None) -> None:
+    def __init__(
+        self,
+        model: Robot,
+        truth: Geometry,
+        random: np.random.Generator | None = None,
+        *,
+        stops: float | None = None,
+        unseen: float = 0.0,
+    ) -> None:
         self.model = model
         self.truth = truth
+        self.stops = model.noise.stops if stops is None else stops
+        self.unseen = unseen
         self.smallest_margin = np.inf
         self._random = random or np.random.default_rng()
         self._command: Pose | None = None
         self._actual: PoseBatch | None = None
+        self._shown: Array = np.full((1, 6), np.nan)
         self._zero: Array | None = None
 
     def actual_poses(self, commands: PoseBatch) -> ActualPoses:
@@ -83,7 +97,7 @@ class VirtualRobot:
         actual = self.actual_poses(commands)
         if not actual.found[0] or self._see_margin(actual.poses, actual.joints) < self._least_margin:
             raise ReachError(f"this robot cannot reach {command}")
-        self._command, self._actual = command, actual.poses
+        self._stop(command, actual.joints, actual.poses)
 
     def move(self, command: Pose) -> None:
         """Move to a command along the controller's straight line.
@@ -101,7 +115,7 @@ class VirtualRobot:
             raise LimitError("a singularity is on the line")
         poses = traced.in_shape(-1)
         self._see_margin(poses, joints)
-        self._command, self._actual = command, poses[[-1]]
+        self._stop(command, joints[[-1]], poses[[-1]])
 
     def load(self, model: Robot) -> None:
         """Have the controller command with another geometry, that of ``model``; the joints stay.
@@ -134,8 +148,7 @@ class VirtualRobot:
         model = self.model
         shown = model.frames.base.T @ self._actual_pose.positions[0]
         shown = shown + model.noise.gauges_mm * self._random.standard_normal(3)
-        joints = self._joints(self._commanded)[0]
-        joints = joints + model.noise.encoders * self._random.standard_normal(6)
+        joints = self._shown[0] + model.noise.encoders * self._random.standard_normal(6)
         self._zero = shown if self._zero is None else self._zero
         deviation = deviation_of(shown - self._zero)
         return Record(point, orientation, self.command, joints_of(joints), deviation)
@@ -154,6 +167,29 @@ class VirtualRobot:
     def _joints(self, commands: PoseBatch) -> Array:
         model = self.model
         return inverse_kinematics(model.mechanism, model.commanding, model.branch, commands)
+
+    def _stop(self, command: Pose, joints: Array, poses: PoseBatch) -> None:
+        """Stop at a command, or beside it where the joints scatter.
+
+        Raises:
+            ReachError: no pose belongs to where the joints stopped.
+        """
+        self._command, self._actual, self._shown = command, poses, joints
+        if not (self.stops or self.unseen):
+            return
+        scatter = self._random.standard_normal((2, 1, 6))
+        self._shown = joints + self.stops * scatter[0]
+        found = continue_solution(
+            self.model.mechanism,
+            self.truth,
+            self._shown + self.unseen * scatter[1],
+            start=poses,
+            start_geometry=self.truth,
+            start_joints=joints,
+        )
+        if not found.found[0]:
+            raise ReachError(f"this robot stops at a singularity beside {command}")
+        self._actual = found.poses
 
     def _see_margin(self, poses: PoseBatch, joints: Array) -> float:
         """The smallest singularity margin at some poses."""

@@ -17,6 +17,8 @@ import numpy as np
 
 from hexacell.cell.model import CellSettings
 from hexacell.design.predicted_records import SAFETY_SIGMAS, STOP_SIGMAS, TRAVEL_SHARE
+from hexacell.errors import LimitError
+from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from hexacell.noise.ball_by_encoders import BallByEncoders
@@ -41,11 +43,13 @@ class Allowances:
         settings: of the cell, as stated.
         robot: with the geometry that its controller has, and the noise of a record as known by now.
         is_measured: whether its noise was measured.
+        found: what was identified, once it was.
     """
 
     settings: CellSettings
     robot: Robot
     is_measured: bool = False
+    found: Identification | None = None
 
     @property
     def stops(self) -> float:
@@ -84,10 +88,18 @@ class Allowances:
         return ReferenceChange(
             unexplained_mm=change[:3] - ball.motion(joints),
             covariance=covariance,
+            by_stops=2.0 * ball.by_joints @ ball.by_joints.T,
             explicable_mm=np.zeros(3) if is_fixed else SIGMAS * np.sqrt(np.diag(covariance)),
             joints=joints,
             explicable_joints=0.0 if is_fixed else float(np.sqrt(2.0)) * SIGMAS * self.stops,
         )
+
+    def between_visits(self, reference: Pose, visits: Array) -> tuple[ReferenceChange, ...]:
+        """The changes between m visits (m, 9) of one reference, as m - 1 that are independent."""
+        count = len(visits)
+        rows = np.array([[1.0] * k + [-k] + [0.0] * (count - k - 1) for k in range(1, count)])
+        contrasts = np.sqrt(2.0) * rows / np.linalg.norm(rows, axis=1, keepdims=True)
+        return tuple(self.since(reference, np.zeros(9), one) for one in contrasts @ visits)
 
     def mounting_mm(self, reference: Pose) -> Array:
         """How far each plunger (3,) may stand from the middle of its travel when the gauges are zeroed.
@@ -105,12 +117,25 @@ class Allowances:
         widened = np.minimum(SIGMAS * scatter, kept)
         return np.asarray(np.maximum(stated, widened))
 
-    def needed_travel_mm(self, reference: Pose) -> float:
-        """Measuring range of gauges in which the ball stays by chance, if it is not moved at all, mm."""
+    def require_travel(self, reference: Pose) -> None:
+        """Require gauges in which the ball stays by chance, if it is not moved at all.
+
+        Raises:
+            LimitError: the machine scatters so much that no pose keeps it there.
+        """
         ball = self.ball_at(reference)
         records = 2.0 * SAFETY_SIGMAS**2 * self._record_covariance(ball)
         stops = STOP_SIGMAS**2 * self.robot.noise.stop_covariance(ball.by_joints[None])[0]
-        return 2.0 * float(np.sqrt(np.diag(records + stops).max())) / TRAVEL_SHARE
+        needed = 2.0 * float(np.sqrt(np.diag(records + stops).max())) / TRAVEL_SHARE
+        narrowest = min(gauge.travel_mm for gauge in self.settings.gauges)
+        travel = min(narrowest, 2.0 * self.settings.limits.gauge_travel_mm)
+        if needed > travel:
+            raise LimitError(
+                f"this machine does not repeat well enough for gauges of {travel:g} mm: the ball leaves "
+                "their travel by chance, wherever it is",
+                action=f"Use gauges with a travel of more than {needed:.0f} mm, and state it in "
+                "gauges.travel_mm and limits.gauge_travel_mm; or look for play in guides and joints",
+            )
 
     def _record_covariance(self, ball: BallByEncoders) -> Array:
         """Covariance (3, 3), mm^2, of what the gauges show in a record, less what its encoders explain."""
@@ -119,7 +144,7 @@ class Allowances:
     def ball_at(self, reference: Pose) -> BallByEncoders:
         """How the ball moves near a reference by what the encoders show."""
         robot = self.robot
-        return BallByEncoders.at(robot, robot.belief(), robot.from_commands([reference]))
+        return BallByEncoders.at(robot, robot.belief(self.found), robot.from_commands([reference]))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,6 +154,7 @@ class ReferenceChange:
     Attributes:
         unexplained_mm: (3,) of the gauges x, y, z, less what the encoders show of it.
         covariance: (3, 3), mm^2, of that, by noise and an uncertain geometry.
+        by_stops: (3, 3), mm^2, by joints that stop one unit beside what their encoders show.
         explicable_mm: (3,) up to which these explain it.
         joints: (6,) of the encoders.
         explicable_joints: up to which the scatter of the stops explains these.
@@ -136,6 +162,7 @@ class ReferenceChange:
 
     unexplained_mm: Array
     covariance: Array
+    by_stops: Array
     explicable_mm: Array
     joints: Array
     explicable_joints: float

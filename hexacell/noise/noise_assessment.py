@@ -17,10 +17,11 @@ import numpy as np
 from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.planner import Plan
 from hexacell.identification.problem.prior import Noise
+from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.noise.approach_scatter import RepeatedApproaches, approach_scatter
+from hexacell.noise.approach_scatter import RepeatedApproaches, ScatterSource, approach_scatter
 from hexacell.noise.ball_by_encoders import BallByEncoders
 from hexacell.noise.measured_noise import (
     AveragingForecast,
@@ -73,12 +74,26 @@ def visits_agree(plan: Plan, readings: NoiseReadings) -> bool:
     return scatter is None or scatter.source is None
 
 
+def assess_again(
+    plan: Plan, readings: NoiseReadings, measured: MeasuredNoise, found: Identification
+) -> MeasuredNoise:
+    """The noise by the same readings, once the geometry is known by which the encoders move the ball.
+
+    Near a singularity the drawing may be wrong by half in that. The records were taken as ``measured``.
+    """
+    again = _NoiseAssessment(plan, readings, found)
+    x, y, z, *encoders = again.instruments(measured.windows)
+    update = {"gauges": (x, y, z), "encoders": tuple(encoders), "approaches": again.scatter}
+    return measured.model_copy(update=update)
+
+
 @dataclass(frozen=True, eq=False)
 class _NoiseAssessment:
     """The parts of one assessment; arrays (9,) have gauges x, y, z, then the encoders."""
 
     plan: Plan
     readings: NoiseReadings
+    found: Identification | None = None
 
     def result(self) -> MeasuredNoise:
         by_windows = {windows: self._of_records(windows) for windows in WINDOWS}
@@ -90,7 +105,7 @@ class _NoiseAssessment:
         forecaster = AveragingForecaster(self.plan)
         forecasts = forecaster.forecasts(noise)
         windows = worthwhile_windows(forecasts, self.plan.settings.noise.averaged_windows)
-        x, y, z, *encoders = self._instruments(by_windows[windows])
+        x, y, z, *encoders = self.instruments(windows)
         return MeasuredNoise(
             gauges=(x, y, z),
             encoders=tuple(encoders),
@@ -118,9 +133,13 @@ class _NoiseAssessment:
         """What the visits show beyond the stated noise and that of the readings."""
         robot, visits, least = self.plan.robot, self.readings.visits, self._at_least(self.stated)
         command = robot.from_commands([self.readings.reference])
-        ball = BallByEncoders.at(robot, robot.belief(), command)
+        ball = BallByEncoders.at(robot, robot.belief(self.found), command)
         unit = robot.mechanism.words.joint_unit
-        return approach_scatter(visits[:, :3], visits[:, 3:], ball, least[3:], least[:3], unit)
+        found = approach_scatter(visits[:, :3], visits[:, 3:], ball, least[3:], least[:3], unit)
+        if self.found is not None and found is not None and found.source is ScatterSource.JOINTS:
+            # How large it is, all repeats of a run say together, see :mod:`.repeats`.
+            return found.model_copy(update={"source": None, "excess": 0.0})
+        return found
 
     def _of_records(self, windows: int) -> Array:
         """The noise (9,) of records that are means of some windows, with what does not repeat."""
@@ -154,7 +173,9 @@ class _NoiseAssessment:
         each = zip(self.reading_noise, sigma.tolist(), strict=True)
         return np.array([noise.exceeds(mm, count, significance) for noise, mm in each])
 
-    def _instruments(self, records: Array) -> Iterator[InstrumentNoise]:
+    def instruments(self, windows: int) -> Iterator[InstrumentNoise]:
+        """The noise of each, in records that are means of some windows."""
+        records = self._of_records(windows)
         gauges = sorted(self.plan.settings.gauges, key=lambda gauge: gauge.axis)
         names = [*(f"gauge {one.name}" for one in gauges), *(f"encoder {leg}" for leg in range(1, 7))]
         units = [JointUnit.MM] * 3 + [self.plan.robot.mechanism.words.joint_unit] * 6

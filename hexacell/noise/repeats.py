@@ -2,22 +2,32 @@
 
 A few visits of one reference show the noise only roughly. At the end of each set its reference is read once
 more: what the encoders do not explain of the change is the noise of two readings. All together are one
-estimate of pure error, which is compared with the noise that the run counts with.
+estimate of pure error, which is compared with the noise V that the run counts with.
+
+What is more may be of all readings, ``f^2 V``, or of joints that stop beside what their encoders show,
+``V + x^2 G G^T``: the one with the larger likelihood counts.
 
 Source: Draper and Smith, Applied Regression Analysis, 3rd ed. 1998, chapter 2 (pure error).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from hexacell.distributions import chi_square_exceedance
 from hexacell.identification.problem.prior import Noise
+from hexacell.identification.solver.chi_square import ChiSquareTest
+from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.parameters import LEGS
+from hexacell.kinematics.rotations import Array
 from hexacell.noise.allowances import ReferenceChange
 from hexacell.noise.approach_scatter import RepeatedApproaches
+from hexacell.robot.model import Robot
+from hexacell.uncertainty.effect_kinds import with_measured_stops
 
 SIGNIFICANCE = 0.01
 """Probability of the noise that is counted with below which the repeats show that it is larger."""
@@ -25,51 +35,129 @@ SIGNIFICANCE = 0.01
 LEAST_FREEDOM = 9
 """Fewer degrees of freedom say nothing of use."""
 
+LIKELY = 0.02
+"""Probability likewise, of the repeats and of the residuals of the fit together, below which stops that no
+encoder sees count at work. The residuals are many, so that few machines have them and are not noticed."""
+
+FEWEST = 5.0
+"""Degrees of freedom that a size has at least: the likelihood of a small one has no peak to tell them."""
+
+SIZES = np.geomspace(1e-2, 1e3, 400)
+"""Of stops that are tried, as multiples of the noise of the encoders."""
+
 
 @dataclass(frozen=True, slots=True)
+class UnseenStops:
+    """Where joints stop beside what their encoders show, one standard deviation, and how well it is known.
+
+    ``better`` is the logarithm of their likelihood, less that of noise of all readings.
+    """
+
+    size: float
+    freedom: float
+    better: float
+
+
+@dataclass(frozen=True, eq=False)
 class Repeats:
     """What repeated readings show of the noise that a run counts with.
 
     Attributes:
-        chi2: of all repeats under that noise.
-        freedom: their degrees of freedom.
+        changes: of readings at one pose, each with its covariance by that noise.
         is_measured: whether that noise was measured by some of them, not stated.
+        seen_freedom: degrees of freedom of the stops that the encoders show.
+        residuals: of a fit with that noise; None without one.
     """
 
-    chi2: float
-    freedom: float
-    is_measured: bool
+    changes: tuple[ReferenceChange, ...]
+    is_measured: bool = False
+    seen_freedom: float = np.inf
+    residuals: ChiSquareTest | None = None
 
     @classmethod
-    def of(cls, approaches: RepeatedApproaches | None, changes: Iterable[ReferenceChange]) -> Repeats:
-        """By visits of one reference, and by how readings at others changed."""
-        chi2 = freedom = 0.0
+    def of(
+        cls,
+        approaches: RepeatedApproaches | None,
+        changes: Sequence[ReferenceChange],
+        noise: Noise,
+        found: Identification | None = None,
+    ) -> Repeats:
+        """By visits of one reference, changes of readings at others, and what was found with that noise."""
+        seen = np.inf if approaches is None else float(LEGS * (approaches.visits - 1))
         is_measured = approaches is not None and approaches.source is not None
-        if approaches is not None:
-            freedom += approaches.degrees_of_freedom
-            chi2 += freedom * (1.0 if is_measured else approaches.ratio**2)
-        for change in changes:
-            shown = change.unexplained_mm
-            chi2 += float(shown @ np.linalg.solve(change.covariance, shown))
-            freedom += len(shown)
-        return cls(chi2, freedom, is_measured)
+        is_of_fit = found is not None and found.problem.noise.encoder <= noise.encoder * (1.0 + 1e-6)
+        return cls(tuple(changes), is_measured, seen, found.goodness if found and is_of_fit else None)
 
     @property
-    def factor(self) -> float:
-        """Factor of all noise, above 1 where the repeats show that it is larger."""
-        if self.freedom < LEAST_FREEDOM or chi_square_exceedance(self.freedom, self.chi2) >= SIGNIFICANCE:
-            return 1.0
-        return float(np.sqrt(self.chi2 / self.freedom))
+    def freedom(self) -> float:
+        """Degrees of freedom of all changes."""
+        return 3.0 * len(self.changes)
+
+    @cached_property
+    def chi2(self) -> float:
+        """Of all changes under the noise that is counted with."""
+        solved = np.linalg.solve(self._covariances, self._shown[..., None])[..., 0]
+        return float(np.sum(self._shown * solved))
 
     def applied_to(self, noise: Noise) -> Noise:
         """The noise as the repeats show it; what is stated stays unless they contradict it."""
-        if self.factor == 1.0 and not self.is_measured:
-            return noise
-        return replace(noise.scaled(self.factor), freedom=self.freedom)
+        if not self._is_larger(SIGNIFICANCE):
+            return replace(noise, freedom=self.freedom) if self.is_measured else noise
+        stops = self.unseen_stops(noise)
+        if stops.better > 0.0:
+            noise = noise.with_devices(
+                np.hypot(noise.encoders, stops.size).tolist(), noise.gauges_mm.tolist()
+            )
+            return replace(noise, freedom=stops.freedom)
+        return replace(noise.scaled(self._factor), freedom=self.freedom)
 
-    def unseen_stops(self, noise: Noise) -> float:
+    def unseen_stops(self, noise: Noise) -> UnseenStops:
         """Where joints stop beside what their encoders show, as far as the ``noise`` has no room for it.
 
-        Which instrument it is of is not known: at work it counts as of the joints, which is the worst.
+        It counts at work even where noise of all readings explains the changes better: that is the worst.
         """
-        return noise.encoder * float(np.sqrt(self.factor**2 - 1.0))
+        if not (self._is_larger(SIGNIFICANCE) or self._is_likely):
+            return UnseenStops(0.0, self.freedom, 0.0)
+        sizes, stops = noise.encoder * SIZES, np.stack([one.by_stops for one in self.changes])
+        covariances = self._covariances + (sizes**2)[:, None, None, None] * stops
+        inverses = np.linalg.inv(covariances)
+        misfit = np.einsum("ni,snij,nj->s", self._shown, inverses, self._shown)
+        costs = misfit + np.linalg.slogdet(covariances)[1].sum(axis=-1)
+        best = int(np.argmin(costs))
+        of_all = np.linalg.slogdet(self._covariances)[1].sum() + self.freedom * (
+            2.0 * np.log(self._factor) + 1.0
+        )
+        better = 0.5 * float(of_all - costs[best])
+        weighted = sizes[best] ** 2 * (inverses[best] @ stops)
+        freedom = float(np.einsum("nij,nji->", weighted, weighted))
+        return UnseenStops(float(sizes[best]), max(freedom, FEWEST), better)
+
+    def applied_to_robot(self, robot: Robot) -> Robot:
+        """The robot with that noise, and with what its stops do at work."""
+        unseen = self.unseen_stops(robot.noise)
+        effects = with_measured_stops(robot.effects, 1e3 * unseen.size, unseen.freedom, self.seen_freedom)
+        return replace(robot, noise=self.applied_to(robot.noise), effects=effects)
+
+    def _is_larger(self, significance: float) -> bool:
+        if self.freedom < LEAST_FREEDOM or self.chi2 <= self.freedom:
+            return False
+        return bool(chi_square_exceedance(self.freedom, self.chi2) < significance)
+
+    @property
+    def _is_likely(self) -> bool:
+        if self.residuals is None or self.freedom < LEAST_FREEDOM:
+            return False
+        freedom, chi2 = self.freedom + self.residuals.expected, self.chi2 + self.residuals.chi2
+        return bool(chi_square_exceedance(freedom, chi2) < LIKELY)
+
+    @property
+    def _factor(self) -> float:
+        return float(np.sqrt(self.chi2 / self.freedom))
+
+    @cached_property
+    def _shown(self) -> Array:
+        return np.array([one.unexplained_mm for one in self.changes])
+
+    @cached_property
+    def _covariances(self) -> Array:
+        return np.stack([one.covariance for one in self.changes])

@@ -122,11 +122,13 @@ class UncertaintyBudget:
         length check; what is not known of them is that of the estimate.
         """
         estimated = self.known - self.jacobian @ difference
-        if not of_geometry:
-            return TaskErrors(estimated, self._all)
-        lasting = [line.columns for line in self.lines if line.effect.occurrence is not STOPS]
-        columns = [self.noise, _joined(lasting, self.noise.shape[:2])]
-        return TaskErrors(estimated, np.concatenate(columns, axis=-1))
+        lines = [line for line in self.lines if not (of_geometry and line.effect.occurrence is STOPS)]
+        stated = [line.columns for line in lines if np.isinf(line.effect.freedom)]
+        columns = [self.noise, _joined(stated, self.noise.shape[:2])]
+        measured = tuple(
+            (line.columns, line.effect.freedom) for line in lines if np.isfinite(line.effect.freedom)
+        )
+        return TaskErrors(estimated, np.concatenate(columns, axis=-1), measured)
 
     @property
     def scatters(self) -> bool:
@@ -187,7 +189,8 @@ class UncertaintyBudget:
 
     @cached_property
     def _unknown(self) -> TaskErrors:
-        return TaskErrors(np.zeros_like(self.known), self._all)
+        nothing = self.errors_of(np.zeros(self.jacobian.shape[-1]))
+        return replace(nothing, estimated=np.zeros_like(self.known))
 
     @cached_property
     def _all(self) -> Array:

@@ -63,17 +63,36 @@ def encoder_eccentricities(mdeg: float, source: str = "") -> Effect:
 REPEATABILITY = "repeatability"
 
 
-def with_unseen_stops(effects: Iterable[Effect], size: float) -> tuple[Effect, ...]:
-    """Effects with what repeated readings show of stops that encoders do not see, beyond what is stated.
+def with_measured_stops(
+    effects: Iterable[Effect], unseen: float, freedom: float, seen_freedom: float
+) -> tuple[Effect, ...]:
+    """Effects with what repeated readings show of stops.
 
-    The noise of the records contains it already. ``size`` is in um or mdeg.
+    Args:
+        effects: those that are stated, and those seen by the encoders as they were measured.
+        unseen: of stops that encoders do not see, beyond what is stated, in um or mdeg. The noise of the
+            records contains it already.
+        freedom: degrees of freedom of that.
+        seen_freedom: of what the encoders see.
     """
-    return tuple(
-        replace(effect, size=size, occurrence=Occurrence.STOPS_AT_WORK, source="repeated readings")
-        if effect.name.startswith(REPEATABILITY) and size > effect.size
-        else effect
-        for effect in effects
-    )
+
+    def measured(effect: Effect) -> Effect:
+        is_of_noise = effect.occurrence is Occurrence.STOPS_AT_WORK
+        if not effect.name.startswith(REPEATABILITY):
+            return replace(effect, freedom=seen_freedom) if is_of_noise else effect
+        # What is in the noise already is beside it; what is stated of every stop is not.
+        size = float(np.hypot(unseen, effect.size)) if is_of_noise else unseen
+        if size <= effect.size:
+            return replace(effect, freedom=freedom) if is_of_noise else effect
+        return replace(
+            effect,
+            size=size,
+            occurrence=Occurrence.STOPS_AT_WORK,
+            source="repeated readings",
+            freedom=freedom,
+        )
+
+    return tuple(map(measured, effects))
 
 
 def stop_repeatability(

@@ -47,6 +47,7 @@ class Effect:
         is_estimated: the estimator has these causes as nuisance parameters of this size, so that the
             covariance of its result contains them.
         value: best estimate of each cause, where it was measured; ``size`` is what is not known of that.
+        freedom: degrees of freedom of ``size``, where it was measured by repetition.
     """
 
     name: str
@@ -58,6 +59,7 @@ class Effect:
     source: str = ""
     is_estimated: bool = False
     value: float = 0.0
+    freedom: float = np.inf
 
 
 def errors_of_records(effect: Effect, records: RecordPlacement) -> Array:

@@ -2,7 +2,8 @@
 
 The largest error over the poses is not a linear function of the independent effects that are not known.
 Its uncertainty is therefore computed by drawing them (JCGM 101, Propagation of distributions using a
-Monte Carlo method): U is the half-width about the stated value that holds 95 % of the draws.
+Monte Carlo method): U is the half-width about the stated value that holds 95 % of the draws. An effect
+whose size was measured with few degrees of freedom is drawn from a t-distribution (JCGM 101, 6.4.9).
 """
 
 from __future__ import annotations
@@ -38,10 +39,12 @@ class TaskErrors:
     Attributes:
         estimated: (n, 6) positions, mm, then rotation vectors, rad.
         effects: (n, 6, k) change of these errors by one standard deviation of each independent effect.
+        measured: further effects (n, 6, k), each with the degrees of freedom of its size.
     """
 
     estimated: Array
     effects: Array
+    measured: tuple[tuple[Array, float], ...] = ()
 
     @classmethod
     def of(cls, jacobian: Array, difference: Array, covariance: Array, systematic: Array) -> TaskErrors:
@@ -59,27 +62,33 @@ class TaskErrors:
     @cached_property
     def position(self) -> LargestError:
         """Largest position error, mm."""
-        return _largest(self.estimated[:, :3], self.effects[:, :3])
+        return self._largest(slice(0, 3), 1.0)
 
     @cached_property
     def orientation(self) -> LargestError:
         """Largest orientation error, deg."""
-        return _largest(np.degrees(self.estimated[:, 3:]), np.degrees(self.effects[:, 3:]))
+        return self._largest(slice(3, 6), float(np.degrees(1.0)))
 
     @property
     def worst(self) -> int:
         """Row of the task pose with the largest position error, uncertainty included."""
-        squares = (self.estimated[:, :3] ** 2).sum(axis=-1) + (self.effects[:, :3] ** 2).sum(axis=(1, 2))
+        squares = (self.estimated[:, :3] ** 2).sum(axis=-1)
+        for columns in (self.effects, *(columns for columns, _ in self.measured)):
+            squares = squares + (columns[:, :3] ** 2).sum(axis=(1, 2))
         return int(np.argmax(squares))
 
-
-def _largest(estimated: Array, effects: Array) -> LargestError:
-    """The largest error by components (n, 3), and the effects (n, 3, k) on them."""
-    value = float(np.linalg.norm(estimated, axis=-1).max())
-    draws = np.random.default_rng(SEED).standard_normal((DRAWS, effects.shape[-1]))
-    drawn = estimated + np.tensordot(draws, effects, axes=(1, 2))
-    largest = np.linalg.norm(drawn, axis=-1).max(axis=-1)
-    return LargestError(value, float(np.quantile(np.abs(largest - value), COVERAGE)))
+    def _largest(self, components: slice, factor: float) -> LargestError:
+        """The largest error by some components of all poses, in another unit."""
+        estimated = factor * self.estimated[:, components]
+        value, random = float(np.linalg.norm(estimated, axis=-1).max()), np.random.default_rng(SEED)
+        drawn = estimated
+        for columns, freedom in ((self.effects, np.inf), *self.measured):
+            draws = random.standard_normal((DRAWS, columns.shape[-1]))
+            if np.isfinite(freedom):
+                draws *= np.sqrt(freedom / random.chisquare(freedom, (DRAWS, 1)))
+            drawn = drawn + np.tensordot(draws, factor * columns[:, components], axes=(1, 2))
+        largest = np.linalg.norm(drawn, axis=-1).max(axis=-1)
+        return LargestError(value, float(np.quantile(np.abs(largest - value), COVERAGE)))
 
 
 def covariance_factor(covariance: Array) -> Array:

@@ -22,26 +22,27 @@ from hexacell.cell.model import CellSettings
 from hexacell.checks.check import Check, identified_before
 from hexacell.checks.quick_level import QuickLevel
 from hexacell.design.search_effort import USUAL_EFFORT, SearchEffort
+from hexacell.errors import IdentifiabilityError
+from hexacell.identification.estimator import identify
 from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.commanded_motion import RefusedCommands
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
-from hexacell.noise.allowances import Allowances, ReferenceChange
+from hexacell.noise.allowances import Allowances
 from hexacell.noise.measured_noise import MeasuredNoise, with_measured_noise
 from hexacell.noise.repeats import Repeats
 from hexacell.results.result import AcceptedResult
 from hexacell.results.written_geometry import as_written
-from hexacell.robot.model import Robot
+from hexacell.robot.model import Robot, noise_of
 from hexacell.robot.stated import stated_effects
-from hexacell.uncertainty.effect_kinds import with_unseen_stops
 from hexacell.verdict.decision import ErrorLimits
 from hexacell.verdict.length_check import with_measured_scale
 from procedures.calibration.held_out_poses import HeldOutPoses, PosesByPoint, replacements
+from procedures.calibration.repeatability import noise_again, repeated_readings
 from procedures.run.keys import Phase, SetKey, SixNumbers
-from procedures.run.readings import Reading
-from procedures.run.state import RunState, SetState
+from procedures.run.state import RunState
 
 
 class Mode(StrEnum):
@@ -196,7 +197,7 @@ class Knowledge:
     def check(self) -> Check:
         """The check of the robot as it is now."""
         calibration, wanted, accepted = self.calibration, self.settings.check, self.calibration.accepted
-        before, robot = None, self._at_temperatures(self.robot)
+        before, robot = None, self._at_temperatures(self.robot, self.settings)
         if accepted is not None:
             covariance = np.array(accepted.covariance)
             before = identified_before(robot, covariance, wanted.drift_per_parameter_mm)
@@ -228,25 +229,44 @@ class Knowledge:
             robot = self.quick.robot_after(state.measurements())
         else:
             robot = self.identifying.robot
-        return self._as_measured(robot, state)
+        return self._measured(robot, state)
 
     def written_robot(self, state: RunState) -> Robot:
         """The robot with the proposed geometry in its controller."""
-        return self._as_measured(self.robot.with_controller(self._written), state)
+        return self._measured(self.robot.with_controller(self._written), state)
 
-    def _as_measured(self, robot: Robot, state: RunState) -> Robot:
-        """The robot with the temperatures read while measuring, and the noise that all repeats show."""
-        robot, repeats = self._at_temperatures(robot, state.temperature_range_k), self._repeats(state)
-        effects = with_unseen_stops(robot.effects, 1e3 * repeats.unseen_stops(robot.noise))
-        return replace(robot, noise=repeats.applied_to(robot.noise), effects=effects)
+    def _measured(self, robot: Robot, state: RunState) -> Robot:
+        """The robot with the noise that all repeats show, by the geometry that the records show.
 
-    def _repeats(self, state: RunState) -> Repeats:
-        """All readings at the same references before the geometry is identified."""
-        noise = self.learnt.noise
-        allowances = Allowances(self.calibration.settings, self.identifying.robot, noise is not None)
-        sets = [one for at, one in state.sets.items() if at.phase is Phase.IDENTIFY and one.samples]
-        changes = [since_zero(allowances, one, one.closing) for one in sets if one.closing is not None]
-        return Repeats.of(None if noise is None else noise.approaches, changes)
+        Those of a check do not show the geometry, which is known before.
+        """
+        first = self._as_measured(robot, state)
+        if state.noise is None or self.calibration.mode is not Mode.OPTIMISE:
+            return first
+        try:
+            found = identify(first.problem(state.measurements()))
+        except IdentifiabilityError:  # too few by now
+            return first
+        return self._as_measured(robot, state, found)
+
+    def _as_measured(self, robot: Robot, state: RunState, found: Identification | None = None) -> Robot:
+        """The robot with the temperatures read while measuring, and the noise that all repeats show.
+
+        They show it by the geometry that was ``found``, or by the one known before.
+        """
+        noise, settings = self.learnt.noise, self.settings
+        if noise is not None and found is not None:
+            noise = noise_again(self.calibration.plan, state, found) or noise
+            settings = with_measured_noise(self.calibration.settings, noise)
+            robot = replace(robot, noise=noise_of(settings))
+        robot = self._at_temperatures(robot, settings, state.temperature_range_k)
+        if noise is None:
+            return robot
+        identifying = replace(self.identifying.robot, noise=robot.noise)
+        allowances = Allowances(self.calibration.settings, identifying, is_measured=True, found=found)
+        changes = repeated_readings(state, self.calibration.plan, allowances)
+        repeats = Repeats.of(noise.approaches, [*changes], robot.noise, found)
+        return repeats.applied_to_robot(robot)
 
     def provisional_geometry(self, state: RunState) -> Geometry:
         """The estimate by now, or the provisional geometry that the run applied before an interruption.
@@ -299,21 +319,14 @@ class Knowledge:
         calibration = self.calibration
         return Plan(self.settings, robot, calibration.listed, calibration.effort)
 
-    def _at_temperatures(self, robot: Robot, range_k: float | None = None) -> Robot:
+    def _at_temperatures(self, robot: Robot, settings: CellSettings, range_k: float | None = None) -> Robot:
         """The robot with the effects of temperatures read while measuring, and a scale measured before."""
         accepted = self.calibration.accepted
-        effects = stated_effects(self.settings, range_k)
+        effects = stated_effects(settings, range_k)
         length = None if accepted is None else accepted.length
         is_carried_on = accepted is not None and self.calibration.mode is Mode.QUICK
         known = accepted.parameter_columns if accepted is not None and is_carried_on else {}
         return replace(robot, effects=with_measured_scale(effects, length), known_effects=known)
-
-
-def since_zero(allowances: Allowances, measured: SetState, now: Reading) -> ReferenceChange:
-    """How a reading at the reference of a set differs from the one with which it was zeroed."""
-    zero = measured.samples[0]
-    before, after = (np.array([*one.gauges_mm, *one.joints]) for one in (zero.reading, now))
-    return allowances.since(Pose(*zero.pose), before, after)
 
 
 def expected_records(

@@ -20,7 +20,8 @@ from hexacell.motion.trajectory import LineDurations
 from hexacell.noise.allowances import ReferenceChange
 from hexacell.robot.model import config_layout
 from hexacell.runs.run_folder import RunFolder
-from procedures.calibration.calibration import Calibration, since_zero
+from procedures.calibration.calibration import Calibration
+from procedures.calibration.repeatability import since_zero
 from procedures.devices.device_set import Devices, Thermometers, gather_errors
 from procedures.devices.settling import DeviceSnapshot, Settled, read_series, settle, trimmed_mean
 from procedures.guards.guards import Guards

@@ -16,9 +16,10 @@ from hexacell.errors import HexacellError
 from hexacell.kinematics.rotations import Array
 from hexacell.noise.noise_assessment import visits_agree
 from procedures.calibration.calibration import campaign_state
+from procedures.calibration.repeatability import noise_readings
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState
-from procedures.steps.assess_noise import AssessNoise, noise_readings
+from procedures.steps.assess_noise import AssessNoise
 from procedures.steps.close import CloseSet
 from procedures.steps.lend import Lend
 from procedures.steps.locate import Locate

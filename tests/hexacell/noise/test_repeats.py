@@ -15,15 +15,14 @@ NOISE = Noise(encoder=0.01, gauge_mm=0.01)
 
 def repeats(ratio: float, random) -> Repeats:
     """Six visits more than the first and eight returns, of a machine this much noisier than stated."""
-    visits = float(np.mean((ratio * random.standard_normal(18)) ** 2)) ** 0.5
-    approaches = RepeatedApproaches(
-        visits=7, degrees_of_freedom=18, ball_mm=0.1, ratio=visits, ratio_as_drawn=visits
-    )
+    approaches = RepeatedApproaches(visits=7, degrees_of_freedom=18, ball_mm=0.1, ratio=1.0)
     changes = [
-        ReferenceChange(ratio * random.standard_normal(3), np.eye(3), np.zeros(3), np.zeros(6), 0.0)
-        for _ in range(8)
+        ReferenceChange(
+            ratio * random.standard_normal(3), np.eye(3), np.zeros((3, 3)), np.zeros(3), np.zeros(6), 0.0
+        )
+        for _ in range(6 + 8)
     ]
-    return Repeats.of(approaches, changes)
+    return Repeats.of(approaches, changes, NOISE)
 
 
 def test_noise_as_stated_stays_as_it_is() -> None:
@@ -40,8 +39,28 @@ def test_larger_noise_is_found_with_its_size_and_freedom(ratio) -> None:
     assert np.mean([one.freedom == 18 + 8 * 3 for one in found]) > 0.98
 
 
-def test_what_the_noise_has_no_room_for_counts_as_stops_at_work() -> None:
+@pytest.mark.parametrize("size", [0.02, 0.05])
+def test_joints_that_stop_beside_what_encoders_show_are_told_from_noisy_readings(size) -> None:
+    """They scatter along the directions in which the joints move the ball."""
     random = np.random.default_rng(3)
-    sizes = [repeats(3.0, random).unseen_stops(NOISE) for _ in range(300)]
-    assert np.mean(sizes) == pytest.approx(0.01 * np.sqrt(8.0), rel=0.05)
-    assert repeats(0.5, random).unseen_stops(NOISE) == 0.0
+    found = []
+    for _ in range(200):
+        changes = []
+        for _ in range(14):
+            by_joints = 5.0 * random.standard_normal((3, 6)) * [[1.0], [0.2], [0.05]]
+            stops = by_joints @ by_joints.T
+            covariance = 1e-4 * (stops + np.eye(3))
+            shown = random.multivariate_normal(np.zeros(3), covariance + size**2 * stops)
+            changes.append(ReferenceChange(shown, covariance, stops, np.zeros(3), np.zeros(6), 0.0))
+        found.append(Repeats(tuple(changes)))
+    drawn = [one.unseen_stops(NOISE) for one in found]
+    assert np.sqrt(np.mean([one.size**2 for one in drawn])) == pytest.approx(size, rel=0.05)
+    spread = np.std([one.size**2 for one in drawn]) / size**2
+    assert np.median([np.sqrt(2.0 / one.freedom) for one in drawn]) == pytest.approx(spread, rel=0.3)
+    noise = [one.applied_to(NOISE) for one in found]
+    assert np.mean([one.gauge_mm == pytest.approx(NOISE.gauge_mm) for one in noise]) > 0.8
+
+
+def test_repeats_as_stated_prove_no_stops() -> None:
+    random = np.random.default_rng(4)
+    assert np.mean([repeats(1.0, random).unseen_stops(NOISE).size == 0.0 for _ in range(300)]) > 0.95

@@ -243,7 +243,7 @@ def test_an_unchanged_gauge_trips_if_the_ball_should_have_moved(shown, expected_
 
 def test_drift_has_its_own_exit_code() -> None:
     def change(*unexplained: float, explicable: float = 0.0) -> ReferenceChange:
-        shown = np.array(unexplained), np.eye(3), np.full(3, explicable)
+        shown = np.array(unexplained), np.eye(3), np.zeros((3, 3)), np.full(3, explicable)
         return ReferenceChange(*shown, joints=np.zeros(6), explicable_joints=0.0)
 
     assert reference_drift("P2", change(0.1, -0.1, 0.0), 0.1) is None

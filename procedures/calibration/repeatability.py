@@ -1,0 +1,75 @@
+"""What the repeated readings of a run show: visits of the first reference, and each set's reference again.
+
+They are compared with what the encoders say the ball did. How it moves by the joints is known roughly
+before the geometry is identified, and well afterwards: the same readings then show the noise better.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hexacell.campaign.planner import Plan
+from hexacell.cell.devices import EncoderSettings
+from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.pose import Pose
+from hexacell.noise.allowances import Allowances, ReferenceChange
+from hexacell.noise.measured_noise import MeasuredNoise
+from hexacell.noise.noise_assessment import NoiseReadings, assess_again
+from hexacell.noise.standstill import display_step
+from procedures.run.keys import Phase
+from procedures.run.readings import Reading
+from procedures.run.state import RunState, SetState
+
+
+def noise_readings(measured: SetState, encoders: EncoderSettings, *, windows: int = 1) -> NoiseReadings:
+    """What was read at the reference of a set.
+
+    Its record is no visit like the others if it is the mean of more ``windows``.
+    """
+    zero, series = measured.samples[0], measured.standstill
+    gauges = [] if series is None else series.gauges_mm
+    joints = [] if series is None else series.joints
+    answers = zero.reading.answers if series is None else series.answers
+    steps = [display_step([one[gauge] for one in answers]) for gauge in range(3)]
+    visits = [*([zero.reading] if windows == 1 else []), *(visit.reading for visit in measured.visits)]
+    return NoiseReadings(
+        reference=Pose(*zero.pose),
+        series=np.concatenate([np.reshape(gauges, (-1, 3)), np.reshape(joints, (-1, 6))], axis=1),
+        steps=np.array([*steps, *(encoders.step,) * 6]),
+        visits=np.array([(*reading.gauges_mm, *reading.joints) for reading in visits]),
+        window_readings=len(visits[0].counts),
+    )
+
+
+def since_zero(allowances: Allowances, measured: SetState, now: Reading) -> ReferenceChange:
+    """How a reading at the reference of a set differs from the one with which it was zeroed."""
+    zero = measured.samples[0]
+    before, after = (np.array([*one.gauges_mm, *one.joints]) for one in (zero.reading, now))
+    return allowances.since(Pose(*zero.pose), before, after)
+
+
+def repeated_readings(state: RunState, plan: Plan, allowances: Allowances) -> Iterator[ReferenceChange]:
+    """At visits of the first reference, and at the end of each set before the geometry is identified."""
+    if (visits := _visits(plan, state)) is not None:
+        yield from allowances.between_visits(visits.reference, visits.visits)
+    for key, one in state.sets.items():
+        if key.phase is Phase.IDENTIFY and one.samples and one.closing is not None:
+            yield since_zero(allowances, one, one.closing)
+
+
+def noise_again(plan: Plan, state: RunState, found: Identification) -> MeasuredNoise | None:
+    """The measured noise by the visits, with the geometry that was identified; None where there is none."""
+    measured = None if state.noise is None else state.noise.noise
+    if measured is None or (visits := _visits(plan, state)) is None:
+        return measured
+    return assess_again(plan, visits, measured, found)
+
+
+def _visits(plan: Plan, state: RunState) -> NoiseReadings | None:
+    """The visits by which the noise was measured; None where that set was measured again without."""
+    if state.noise is None:
+        return None
+    visited = state.sets.get(state.noise.at)
+    if visited is None or not visited.samples or len(visited.visits) < plan.settings.noise.revisits:
+        return None
+    return noise_readings(visited, plan.settings.encoders, windows=state.noise.noise.windows)

@@ -25,6 +25,7 @@ SAMPLES: dict[str, dict[str, tuple[int, int]]] = {
     "public_geometries": {"ROBOTS": (8, 100)},
     "quick_level": {"ROBOTS": (12, 100)},
     "recalibration": {"MACHINES": (4, 100)},
+    "scatter": {"MACHINES": (4, 167)},
     "screen_speed": {"RUNS": (3, 5)},
     "statistics": {"PAIRED": (100, 100), "ROBOTS": (200, 1000), "SETS": (1000, 1000)},
     "study_speed": {"ROBOTS": (24, 200)},

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexacell.robot.model import robot_of
-from hexacell.verdict.decision import Verdict
 from tests.benchmarks.figures import NEVER, at_least, at_most, least_by_chance, most_by_chance
 from tests.benchmarks.machines import bundled, on_all_cores
 from tests.benchmarks.samples import sample
@@ -28,12 +27,11 @@ ROBOTS = sample(__name__, "ROBOTS")
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What came of a robot: whether it can stand at all points, and its result is accepted by nobody."""
+    """What came of a robot, and whether it can stand at all points."""
 
     number: int
     stands: bool
     judged: Judged
-    is_accepted: bool = False
 
 
 def outcome(number: int) -> Outcome:
@@ -43,26 +41,23 @@ def outcome(number: int) -> Outcome:
     truth = robot_that_reaches(cell, robot, random)
     stands = stands_at(robot, truth, cell.settings.identification.points)
     one = judged(cell, robot, truth, random, by_leg_equations)
-    if one.done is None:
-        return Outcome(number, stands, one)
-    found = one.done.found
-    is_accepted = one.verdict is Verdict.PASS and not one.is_refused and found.goodness.is_explained
     # What it consists of cannot be sent to another process.
-    return Outcome(number, stands, replace(one, done=None), is_accepted)
+    return Outcome(number, stands, replace(one, done=None))
 
 
 def test_healthy_robots_pass(figure):
     every = on_all_cores(outcome, range(ROBOTS))
     for one in every:
-        if not one.is_accepted:
+        if not one.judged.is_accepted:
             of = one.judged
-            words = f"  robot {one.number}: {of.verdict}, stands {one.stands}, U {of.u_mm:.3f}; {of.reason}"
+            why = " ".join((of.reason, *of.unmet))
+            words = f"  robot {one.number}: {of.verdict}, stands {one.stands}, U {of.u_mm:.3f}; {why}"
             figure(words, of.true_mm, "mm")
     for who, some in (
         ("healthy robots", [one for one in every if one.stands]),
         ("robots that cannot stand at all points", [one for one in every if not one.stands]),
     ):
-        refused = sum(not one.is_accepted for one in some)
+        refused = sum(not one.judged.is_accepted for one in some)
         target = at_most(most_by_chance(0.01, len(some))) if who == "healthy robots" else None
         figure(f"{who}: anything but a pass without a person", refused, f"of {len(some)}", target)
     known = [one.judged for one in every if np.isfinite(one.judged.true_mm)]

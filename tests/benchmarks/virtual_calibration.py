@@ -1,7 +1,7 @@
 """A whole calibration of a virtual robot: measured as planned, identified, written, and verified."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,10 +16,16 @@ from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
+from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.noise.allowances import Allowances
+from hexacell.noise.measured_noise import MeasuredNoise, with_measured_noise
+from hexacell.noise.noise_assessment import NoiseReadings, assess_again, assess_noise
+from hexacell.noise.repeats import Repeats
 from hexacell.results.written_geometry import as_written
 from hexacell.robot.model import Robot, make_robot
 from hexacell.robot.virtual_robot import VirtualRobot, random_robot
+from hexacell.verdict.acceptance_gates import gates
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.verification import HeldOut, Verification, verify
 from procedures.calibration.held_out_poses import HeldOutPoses
@@ -31,6 +37,21 @@ HELD_OUT_FROM, AFTER_FROM, CONFIRMING_FROM = 100, 200, 300
 """Points of the held-out records before and after, and of the confirming ones: of no other records."""
 
 CANDIDATES = 512
+
+
+@dataclass(frozen=True, slots=True)
+class Scatter:
+    """One standard deviation of where a joint stops, in its unit: seen by its encoder, and beside that."""
+
+    seen: float = 0.0
+    unseen: float = 0.0
+
+    def virtual(self, robot: Robot, truth: Geometry, random: np.random.Generator) -> VirtualRobot:
+        """A robot that stops so."""
+        return VirtualRobot(robot, truth, random, stops=self.seen, unseen=self.unseen)
+
+
+REPEATS = Scatter()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +69,8 @@ class Judged:
     """What was stated of a calibration's result, and what is true of it.
 
     ``reason``: where no result was verified, a test of the model failed, or the orientation does not pass.
-    ``outside``: records at which the ball left the gauges' travel.
+    ``outside``: records at which the ball left the gauges' travel. ``unmet``: acceptance gates that would
+    leave it waiting for a person, or refuse it.
     """
 
     truth: Geometry
@@ -61,6 +83,12 @@ class Judged:
     limit_mm: float = np.nan
     outside: int = 0
     reason: str = ""
+    unmet: tuple[str, ...] = ()
+
+    @property
+    def is_accepted(self) -> bool:
+        """Whether a run writes it without a person, and it passes."""
+        return self.verdict is Verdict.PASS and not self.unmet
 
     @property
     def is_covered(self) -> bool:
@@ -92,19 +120,34 @@ def by_derivatives(after: Robot, truth: Geometry, found: Identification, task: T
 
 
 def judged(
-    cell: Cell, robot: Robot, truth: Geometry, random: np.random.Generator, true_error: TrueError
+    cell: Cell,
+    robot: Robot,
+    truth: Geometry,
+    random: np.random.Generator,
+    true_error: TrueError,
+    scatter: Scatter = REPEATS,
 ) -> Judged:
     """Carry a calibration out, and compare what is stated with the truth."""
     try:
-        done = calibrate(cell, robot, truth, random)
+        done = calibrate(cell, robot, truth, random, scatter)
     except HexacellError as failed:
         return Judged(truth, reason=str(failed))
     found, after, says = done.found, done.after, done.verification
     is_refused = bool(robot.tolerance_violations(found.estimate))
+    conditions = gates(
+        found.estimate,
+        robot.tolerance_violations(found.estimate),
+        residuals=found.goodness,
+        change_mm=robot.largest_change(found.geometry),
+        largest_change_mm=cell.settings.acceptance.largest_change_mm,
+    )
+    unmet = tuple(one.sentence for one in conditions if not one.passed)
     reason = ", ".join(test.sentence for test in says.tests if not test.passed)
     if says.accuracy is None:
         reason = reason or "no accuracy"
-        return Judged(truth, done, says.verdict, is_refused, outside=done.outside, reason=reason)
+        return Judged(
+            truth, done, says.verdict, is_refused, outside=done.outside, reason=reason, unmet=unmet
+        )
     belief = after.belief(found)
     task = Task.of(cell.settings, after, belief).reachable(belief)
     position, turned = says.accuracy.position, says.accuracy.orientation
@@ -121,6 +164,7 @@ def judged(
         position.limit,
         done.outside,
         reason,
+        unmet,
     )
 
 
@@ -150,21 +194,84 @@ def stands_at(robot: Robot, truth: Geometry, points: Sequence[Sequence[float]]) 
     return bool(VirtualRobot(robot, truth).can_stand(commands).all())
 
 
-def calibrate(cell: Cell, robot: Robot, truth: Geometry, random: np.random.Generator) -> VirtualCalibration:
-    """Measure, identify, write and verify.
+def calibrate(
+    cell: Cell, robot: Robot, truth: Geometry, random: np.random.Generator, scatter: Scatter = REPEATS
+) -> VirtualCalibration:
+    """Measure noise and records, identify, write and verify.
 
     Raises:
         HexacellError: a run would end with this message.
     """
-    virtual = VirtualRobot(robot, truth, random)
-    campaign = VirtualCampaign(Plan(cell.settings, robot, with_forecast=False), virtual)
+    plan = Plan(cell.settings, robot, with_forecast=False)
+    readings = _visits(cell.settings, scatter.virtual(robot, truth, random))
+    noise = MeasuredRun(plan, readings, assess_noise(plan, readings))
+    settings, robot = noise.settings(), noise.robot(robot)
+    Allowances(cell.settings, robot, is_measured=True).require_travel(readings.reference)
+    campaign = _ClosedCampaign(
+        Plan(settings, robot, with_forecast=False), scatter.virtual(robot, truth, random)
+    )
     campaign.carry_out()
-    measured = campaign.plan.robot  # with the geometries that commanded the records
-    found = identify(measured.problem(campaign.measurements))
-    written = as_written(cell.settings, robot, found.geometry).geometry
-    after = make_robot(cell.settings, ControllerGeometry(written, robot.branch), taught=written)
-    verification = verification_of(cell.settings, found, (robot, after), (truth, random))
+    noise, measurements = replace(noise, closings=campaign.closings), campaign.measurements
+    first = identify(noise.robot(campaign.plan.robot).problem(measurements))
+    found = identify(noise.robot(campaign.plan.robot, first).problem(measurements))
+    written = as_written(settings, robot, found.geometry).geometry
+    after = make_robot(settings, ControllerGeometry(written, robot.branch), taught=written)
+    after = noise.robot(after, first)
+    verification = verification_of(settings, found, (robot, after), (truth, random), scatter)
     return VirtualCalibration(found, after, verification, campaign.outside)
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredRun:
+    """What a run has measured of its noise; ``closings``: reference, first and last reading of points."""
+
+    plan: Plan
+    readings: NoiseReadings
+    noise: MeasuredNoise
+    closings: Sequence[tuple[Pose, Array, Array]] = ()
+
+    def settings(self) -> CellSettings:
+        """Of the cell, with that noise."""
+        return with_measured_noise(self.plan.settings, self.noise)
+
+    def robot(self, robot: Robot, found: Identification | None = None) -> Robot:
+        """A robot with the noise that all repeats show, by what was found or is drawn of its geometry."""
+        noise = self.noise if found is None else assess_again(self.plan, self.readings, self.noise, found)
+        robot = robot.with_errors_of(with_measured_noise(self.plan.settings, noise))
+        measuring = replace(self.plan.robot, noise=robot.noise)
+        allowances = Allowances(self.plan.settings, measuring, is_measured=True, found=found)
+        visits = allowances.between_visits(self.readings.reference, self.readings.visits)
+        changes = [*visits, *(allowances.since(*one) for one in self.closings)]
+        return Repeats.of(noise.approaches, changes, robot.noise, found).applied_to_robot(robot)
+
+
+def _visits(settings: CellSettings, virtual: VirtualRobot) -> NoiseReadings:
+    """The first reference visited as often as a run visits it."""
+    reference, shown = Pose(*settings.identification.points[0]), []
+    for _ in range(1 + settings.noise.revisits):
+        virtual.place(reference)
+        record = virtual.measure(1, 1)
+        shown.append([*record.deviation, *record.joints])
+    return NoiseReadings(reference, np.empty((0, 9)), np.zeros(9), np.array(shown), window_readings=1)
+
+
+@dataclass(eq=False)
+class _ClosedCampaign(VirtualCampaign):
+    """A campaign that reads each reference again before it leaves it, as a run does."""
+
+    closings: list[tuple[Pose, Array, Array]] = field(default_factory=list)
+
+    def _return_to(self, reference: Pose) -> None:
+        self.virtual_robot.place(reference)
+        point = self.state.point
+        records = [record for record in self.measurements.records if record.point == point]
+        if point is None or len(records) < 2:
+            return
+        before, now = (
+            np.array([*one.deviation, *one.joints])
+            for one in (records[0], self.virtual_robot.measure(point, 1))
+        )
+        self.closings.append((reference, before, now))
 
 
 def verification_of(
@@ -172,6 +279,7 @@ def verification_of(
     found: Identification,
     robots: tuple[Robot, Robot],
     actual: tuple[Geometry, np.random.Generator],
+    scatter: Scatter = REPEATS,
 ) -> Verification:
     """What a run states of a result: held-out poses before and after, and new ones after a narrow failure.
 
@@ -186,9 +294,11 @@ def verification_of(
     common = HeldOutPoses(settings, before, CANDIDATES).before(found)
     chosen = HeldOutPoses(settings, after, CANDIDATES)
     wide = chosen.after(found, common)
-    old = _visited(VirtualRobot(before, *actual), common, HELD_OUT_FROM)
+    old = _visited(scatter.virtual(before, *actual), common, HELD_OUT_FROM)
     both = [first + more for first, more in zip(common, wide, strict=True)]
-    new = _visited(VirtualRobot(after, *actual), both, AFTER_FROM)
+    new = _visited(scatter.virtual(after, *actual), both, AFTER_FROM)
+    if scatter != REPEATS:  # a ball that leaves the travel by chance costs a pose, in both phases
+        old, new = _inside(before, old, new)
     if not _keeps_travel(before, old):
         raise LimitError("the ball left the gauges' travel at a held-out pose")
     compared = [one for one in new if one.orientation <= len(common[one.point - AFTER_FROM])]
@@ -202,7 +312,8 @@ def verification_of(
     if not verified.needs_confirmation:
         return verified
     poses = chosen.confirming(found, common, wide)
-    confirming = MeasurementSet(tuple(_visited(VirtualRobot(after, *actual), poses, CONFIRMING_FROM)))
+    records = _visited(scatter.virtual(after, *actual), poses, CONFIRMING_FROM)
+    confirming = MeasurementSet(tuple(_inside(after, records, records)[0]))
     return (
         verify(settings, after, found, replace(held_out, confirming=confirming)) if confirming else verified
     )
@@ -221,6 +332,16 @@ def _visited(virtual: VirtualRobot, points: Sequence[Sequence[SixNumbers]], firs
             virtual.place(Pose(*pose))
             records.append(virtual.measure(number, orientation))
     return records
+
+
+def _inside(robot: Robot, old: list[Record], new: list[Record]) -> tuple[list[Record], list[Record]]:
+    """Records of both phases without those of poses at which the ball left the gauges' travel in either."""
+
+    def pose(record: Record) -> tuple[int, int]:
+        return record.point % HELD_OUT_FROM, record.orientation
+
+    left = {pose(one) for one in (*old, *new) if not _keeps_travel(robot, [one])}
+    return [one for one in old if pose(one) not in left], [one for one in new if pose(one) not in left]
 
 
 def _deviations(records: Sequence[Record]) -> list[tuple[float, float, float]]:

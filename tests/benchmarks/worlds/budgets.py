@@ -85,6 +85,9 @@ _DRAWS: dict[str, Draw] = {
     "scale common to all encoders": lambda s, r: _scale(s * r.standard_normal() * np.ones(6)),
     "scale of each encoder": lambda s, r: _scale(s * r.standard_normal(6)),
     "repeatability of a slider": lambda s, _: rails.stopping(s * UM, np.array([1.0, 0.0, 0.0])),
+    "stops of a slider beside its command": lambda s, _: at_once(
+        rails.stopping(s * UM, np.array([1.0, 0.0, 0.0])), at_work=True
+    ),
     "direction of each rail": _directions,
     **{f"waves of the rails, {wave:g} mm long": _waves(wave) for wave in WAVES_MM},
     "sag common to all rails": lambda s, r: rails.sagging(s * UM * r.standard_normal() * np.ones(6)),

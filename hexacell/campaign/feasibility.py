@@ -13,7 +13,6 @@ from hexacell.errors import HexacellError, LimitError, ReachError, UsageError
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose
 from hexacell.motion.path_check import is_clear
-from hexacell.noise.allowances import Allowances
 from hexacell.robot.pose_limits import broken_limits
 from hexacell.robot.virtual_robot import VirtualRobot, robots_within_tolerances
 from hexacell.uncertainty.statement import COVERAGE_FACTOR
@@ -111,11 +110,6 @@ def optimisation_failures(plan: Plan) -> Iterator[list[HexacellError]]:
 
 def measuring_failures(plan: Plan) -> Iterator[list[HexacellError]]:
     """What prevents a plan whose poses can be reached from selecting its poses, likewise in parts."""
-    try:
-        Allowances(plan.settings, plan.robot).require_travel(plan.reference_pose(plan.points[0]))
-    except LimitError as error:  # whose every pose would fail as well
-        yield [error]
-        return
     if plan.robot.known is None:
         yield [*_unreachable_points(plan)]
     yield [*_blocked_lines(plan)]

@@ -6,8 +6,9 @@ from pathlib import Path
 from drivers.errors import GaugeAtEnd, NotHomedError
 from drivers.interfaces import CheckedController, EncoderSample, GaugeReading
 from hexacell.campaign import feasibility
-from hexacell.errors import AnswerNeeded, HexacellError, flatten_errors, joined
+from hexacell.errors import AnswerNeeded, HexacellError, LimitError, flatten_errors, joined
 from hexacell.kinematics.pose import Pose
+from hexacell.noise.allowances import Allowances
 from procedures.calibration.calibration import Calibration, Mode
 from procedures.devices.device_set import Devices, gather_errors
 from procedures.guards.position_check import PositionCheck
@@ -45,9 +46,15 @@ def _plan_failures(calibration: Calibration, *, unattended: bool) -> Iterator[li
     yield failures
     too_few = [] if is_check else [*feasibility.too_few_records(calibration.plan)]
     yield too_few
+    plan = calibration.plan
+    try:
+        Allowances(plan.settings, plan.robot).require_travel(plan.reference_pose(plan.points[0]))
+    except LimitError as error:  # for which every pose would fail as well
+        yield [error]
+        return
     if not failures and not too_few:
         find = feasibility.measuring_failures if is_known else feasibility.optimisation_failures
-        yield from find(calibration.plan)
+        yield from find(plan)
     if unattended and calibration.settings.stations.placement == "by-hand":
         yield [
             AnswerNeeded(

@@ -188,7 +188,7 @@ class VirtualRobot:
             start_joints=joints,
         )
         if not found.found[0]:
-            raise ReachError(f"this robot stops at a singularity beside {command}")
+            raise ReachError(f"this robot cannot reach {command}")
         self._actual = found.poses
 
     def _see_margin(self, poses: PoseBatch, joints: Array) -> float:

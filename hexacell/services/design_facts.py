@@ -264,22 +264,26 @@ def _similarity(base: Array, platform: Array) -> float:
 
 
 def _out_of_reach(cell: Cell, robot: Robot, commands: PoseBatch) -> FileError:
-    """All stated poses are out of reach: the first reason, and the shortest way of all that helps."""
-    settings, controller = without_leg_limits(cell).settings, controller_geometry(cell)
-    first = commands[[0]]
-    pose = Pose(*first.numbers()[0].tolist())
+    """All stated poses are out of reach: the first reason, and what helps."""
+    pose = Pose(*commands[[0]].numbers()[0].tolist())
     reason = next(broken_limits(robot, pose), "a passive joint or a leg is beyond its limits")
-    action = "Correct points, drawing, or limits"
+    return FileError(
+        f"all {len(commands)} stated poses are out of reach; the first, {pose}: {reason}",
+        subject=cell.path,
+        line=cell.document.line_of(("identification", "points")),
+        action=_way_into_reach(cell, robot, commands),
+    )
+
+
+def _way_into_reach(cell: Cell, robot: Robot, commands: PoseBatch) -> str:
+    """What brings all poses into reach: other limits of legs, or the shortest way along an axis."""
+    settings, controller = without_leg_limits(cell).settings, controller_geometry(cell)
+    if _can_stand(settings, controller, commands).mean() >= NEARLY_ALL:
+        return "Correct [limits.passive_joints] or leg_distance_mm: without them the robot takes them"
     step = size_mm_of(robot.drawing) / (SHIFTS / 2)
     ways = (number * sign * step for number in range(1, SHIFTS + 1) for sign in (1.0, -1.0))
     for way, axis in product(ways, (2, 1, 0)):
         moved = PoseBatch(commands.positions + way * np.eye(3)[axis], commands.rotations)
         if _can_stand(settings, controller, moved).mean() >= NEARLY_ALL:
-            action = f"Move them all by some {way:+.0f} mm along {AXES[axis]}: there the robot takes them"
-            break
-    return FileError(
-        f"all {len(commands)} stated poses are out of reach; the first, {pose}: {reason}",
-        subject=cell.path,
-        line=cell.document.line_of(("identification", "points")),
-        action=action,
-    )
+            return f"Move them all by some {way:+.0f} mm along {AXES[axis]}: there the robot takes them"
+    return "Correct points, drawing, or limits"

@@ -76,10 +76,15 @@ class AskedOfLimit:
 
     def corrected_in(self, cell: Cell) -> Cell:
         """The cell with the limit in the right unit."""
-        values = {field: self.factor * value for field, value in self.ends.items()}
+        values, limits = (
+            {field: self.factor * value for field, value in self.ends.items()},
+            cell.settings.limits,
+        )
         if "axes" in self.path:
             ends = {str(self.path[-1]): (values["min"], values["max"])}
-            return _with_limits(cell, axes=cell.settings.limits.axes.model_copy(update=ends))
+            return _with_limits(cell, axes=limits.axes.model_copy(update=ends))
+        if "passive_joints" in self.path:
+            return _with_limits(cell, passive_joints=limits.passive_joints.model_copy(update=values))
         return _with_limits(cell, **values)
 
 
@@ -99,6 +104,14 @@ def asked_of_limits(cell: Cell, robot: Robot, commands: PoseBatch) -> Iterator[A
         path: KeyPath = ("limits", field)
         ends = {field: largest}
         yield AskedOfLimit(path, stated, -np.inf, largest, numbers, DEG_PER_RAD, small, ends, is_round)
+    for field in ("base_cone_deg", "platform_cone_deg"):
+        widest = float(np.max(getattr(limits.passive_joints, field)))
+        path, ends = ("limits", "passive_joints", field), {field: widest}
+        # What the poses ask of it is not known without its axes: only its digits tell.
+        is_round = widest <= np.pi and _chance_of_radians([widest]) < CHANCE_OF_ONE
+        nothing = np.zeros((len(commands), 1))
+        stated = f"{field} = {widest:g}"
+        yield AskedOfLimit(path, stated, -np.inf, widest, nothing, DEG_PER_RAD, is_round, ends, is_round)
     joints = robot.mechanism.inverse(robot.commanding, robot.branch, robot.frames.poses(commands))
     joints = joints[np.isfinite(joints).all(axis=-1)]
     is_angle = robot.mechanism.words.joint_unit is JointUnit.DEG
@@ -124,9 +137,12 @@ def asked_of_limits(cell: Cell, robot: Robot, commands: PoseBatch) -> Iterator[A
 def limit_in_other_unit(cell: Cell, asked: AskedOfLimit) -> FileError:
     """That a limit is in metres or radians."""
     unit, wanted = ("radians", "degrees") if asked.factor == DEG_PER_RAD else ("metres", "millimetres")
+    evidence = ""
+    if exceeded := asked.exceeded():
+        then = asked.exceeded(asked.factor)
+        evidence = f": {exceeded:.0%} of the stated poses exceed it, and {then:.0%} would if it were {unit}"
     return FileError(
-        f"{asked.stated} looks like {unit}: {asked.exceeded():.0%} of the stated poses exceed it, and "
-        f"{asked.exceeded(asked.factor):.0%} would if it were {unit}",
+        f"{asked.stated} looks like {unit}{evidence}",
         subject=cell.path,
         line=cell.document.line_of(asked.path),
         action=f"Write {wanted}",

@@ -115,6 +115,18 @@ CASES = {
         [],
         ["tilt_deg = 0.785 looks like radians", "Write degrees"],
     ),
+    "cone in radians": (
+        HEXAGLIDE,
+        [instead("base_cone_deg = 45.0", "base_cone_deg = 0.785")],
+        [],
+        ["base_cone_deg = 0.785 looks like radians. Write degrees"],
+    ),
+    "cone of another joint": (
+        HEXAGLIDE,
+        [instead("base_cone_deg = 45.0", "base_cone_deg = 0.5")],
+        [],
+        ["all 16 stated poses are out of reach", "Correct [limits.passive_joints] or leg_distance_mm"],
+    ),
     "task in radians": (
         HEXAGLIDE,
         [in_rows("poses", with_columns(TILTS, lambda deg: np.round(np.radians(deg), 3)))],

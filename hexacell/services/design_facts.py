@@ -267,12 +267,11 @@ def _out_of_reach(cell: Cell, robot: Robot, commands: PoseBatch) -> FileError:
     """All stated poses are out of reach: the first reason, and what helps."""
     pose = Pose(*commands[[0]].numbers()[0].tolist())
     reason = next(broken_limits(robot, pose), "a passive joint or a leg is beyond its limits")
-    action = _way_into_reach(cell, robot, commands)
     return FileError(
         f"all {len(commands)} stated poses are out of reach; the first, {pose}: {reason}",
         subject=cell.path,
         line=cell.document.line_of(("identification", "points")),
-        action=action,
+        action=_way_into_reach(cell, robot, commands),
     )
 
 

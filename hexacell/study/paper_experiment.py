@@ -35,6 +35,9 @@ CALIBRATING = 3
 AMPLITUDE_DEG = 20.0
 
 REPEATABILITIES_MM = (0.002, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
+MEAN_DISTANCE = 4.0 / float(np.sqrt(np.pi))
+"""Of two places that scatter along each axis, in standard deviations: a Maxwell distribution's mean."""
+
 PAPER_REDUCTION = 0.60
 PAPER_REPEATABILITY_MM = 2.0
 
@@ -147,13 +150,17 @@ class Reduction:
 
 @dataclass(frozen=True, slots=True)
 class RepeatabilityRow:
-    """All draws with one repeatability; ``ended``: in how many the paper's estimator comes to an end."""
+    """All draws with one repeatability; ``ended``: in how many the paper's estimator comes to an end.
+
+    ``floor_mm`` is what no calibration can better: the mean distance of two places that scatter.
+    """
 
     repeatability_mm: float
     draws: int
     ended: int
     calibrating: Reduction
     verifying: Reduction
+    floor_mm: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,6 +191,7 @@ def experiment_summary(
                 sum(bool(one.calibrating.paper) for one in found),
                 Reduction.of([one.calibrating for one in found]),
                 Reduction.of([one.verifying for one in found]),
+                MEAN_DISTANCE * mm,
             )
         )
     return ExperimentStudy(tuple(rows), outcomes[Experiment(PAPER_REPEATABILITY_MM, 0).key])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hexacell.study.paper_experiment import (
+    MEAN_DISTANCE,
     REPEATABILITIES_MM,
     Differences,
     Experiment,
@@ -28,7 +29,9 @@ def test_a_repeatable_robot_comes_back_to_the_place(repeatable) -> None:
 def test_what_is_left_of_another_robot_is_its_repeatability() -> None:
     """Two places that scatter by s along each axis are 2.26 s apart in the mean: 4 s / sqrt(pi)."""
     found = run_experiment(Experiment(0.5, 0))
-    expected = 4.0 / np.sqrt(np.pi) * 0.5
+    places = np.random.default_rng(1).standard_normal((2, 100_000, 3))
+    assert pytest.approx(np.linalg.norm(places[0] - places[1], axis=-1).mean(), rel=0.01) == MEAN_DISTANCE
+    expected = MEAN_DISTANCE * 0.5
     assert 0.8 * expected < np.mean(found.calibrating.ours) < 2.0 * expected
 
 

@@ -208,8 +208,8 @@ def experiment_lines(study: ExperimentStudy) -> Iterator[str]:
     )
     yield wrapped(
         f"Two places that scatter are {MEAN_DISTANCE:.2f} times the repeatability apart in the mean, "
-        f"whatever the geometry: at {coarsest.repeatability_mm:g} mm nobody can have more than {most:.0f} percent "
-        f"less. Ours over that floor at P4 to P6: {ratios}."
+        f"whatever the geometry: at {coarsest.repeatability_mm:g} mm nobody can have more than {most:.0f} "
+        f"percent less. Ours over that floor at P4 to P6: {ratios}."
     )
 
 

@@ -9,10 +9,13 @@ from functools import cache, partial
 import numpy as np
 import pytest
 
+from hexacell.campaign.planner import Plan
+from hexacell.dry_run.campaign import dry_run
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.model import Robot, robot_of
+from hexacell.verdict.decision import Verdict
 from tests.benchmarks.figures import NEVER, at_least, between, least_by_chance
 from tests.benchmarks.machines import bundled, on_all_cores
 from tests.benchmarks.samples import sample
@@ -58,6 +61,12 @@ def test_robots_within_the_tolerances_are_identified_and_none_is_wrong(figure, n
     figure(
         f"{name}: pass without a person", accepted, f"of {ROBOTS}", at_least(least_by_chance(0.99, ROBOTS))
     )
+    plan = Plan(bundled(name).settings, robot_of(bundled(name)))
+    verdicts = dry_run(plan).verdicts
+    assert verdicts is not None
+    passing, chance = verdicts.probabilities[Verdict.PASS], 3.0 * float(np.sqrt(0.25 / ROBOTS))
+    near = between(accepted / ROBOTS - 0.05 - chance, accepted / ROBOTS + 0.05 + chance)
+    figure(f"{name}: pass by the forecast of preflight, the share of robots beside it", passing, "", near)
     false = sum(one.is_false_pass for one in every)
     figure(f"{name}: pass though the error is above the limit", false, "", NEVER)
     figure(f"{name}: true error within U", sum(one.is_covered for one in known), f"of {len(known)}")

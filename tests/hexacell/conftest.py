@@ -7,7 +7,7 @@ root finder with its own finite differences.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import product
 
@@ -275,8 +275,10 @@ def problem_of(
 
 @pytest.fixture(scope="session")
 def bundled_cell() -> Cell:
-    """The cell of the demo, on the paper's robot."""
-    return load_cell(bundled_config("simulated-hexaglide"))
+    """The cell of the demo, on the paper's robot, with gauges exactly along the axes as in the tests."""
+    cell = load_cell(bundled_config("simulated-hexaglide"))
+    exact = cell.settings.stations.model_copy(update={"alignment_deg": 0.0})
+    return replace(cell, settings=cell.settings.model_copy(update={"stations": exact}))
 
 
 @pytest.fixture(scope="session")

@@ -79,7 +79,7 @@ def test_a_good_result_passes_and_its_true_error_is_within_u(cell, result, held_
     errors = error_jacobian(belief, task.poses, task.workspace) @ (found.free - actual)
     true = np.linalg.norm(errors[:, :3], axis=-1).max()
     assert abs(position.value - true) <= position.expanded
-    assert 0.02 < position.expanded < 0.1
+    assert 0.02 < position.expanded < 0.16
 
 
 def turned_in(frames, axes, there, wanted):

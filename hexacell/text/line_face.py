@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from hexacell.campaign.decisions import Forecast
-from hexacell.lengths import shown
+from hexacell.lengths import unit_of
 from hexacell.text.layout import COLUMNS, duration, wrapped
 from hexacell.text.measured_noise import measured_noise_text
 from hexacell.text.planning import quick_accuracy_text, quick_start_text, run_forecast_line
@@ -63,7 +63,8 @@ def run_status_text(
         lines.append(f"Last record: {record_text(last)}")
     if forecast is not None:
         left = f", {duration(forecast.minutes)} left" if forecast.minutes > 0.0 else ""
-        errors = f"{shown(forecast.now_mm)} now, {shown(forecast.end_mm)} at the end"
+        unit = unit_of(forecast.now_mm, forecast.end_mm)
+        errors = f"{unit.length(forecast.now_mm)} now, {unit.length(forecast.end_mm)} at the end"
         lines.append(f"Predicted error at the task: {errors}{left}")
     return "\n".join(wrapped(line, indent=2) for line in lines)
 

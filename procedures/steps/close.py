@@ -5,7 +5,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from hexacell.lengths import shown
+from hexacell.lengths import unit_of
 from hexacell.measurements.records import deviation_of
 from hexacell.noise.allowances import ReferenceChange
 from procedures.resources.run_resources import RunResources
@@ -37,9 +37,10 @@ class SetClosed(EventOfSet):
         samples = state.set(self.at).samples
         largest = max(float(np.abs(sample.deviation_mm).max()) for sample in samples)
         drift = float(np.abs(self.drift_mm).max())
+        unit = unit_of(largest, drift)
         line = (
             f"{self.at.name:24} {len(samples):2} records, "
-            f"largest deviation {shown(largest)}, drift {shown(drift)}"
+            f"largest deviation {unit.length(largest)}, drift {unit.length(drift)}"
         )
         return (
             f"{line}\n{self.at.name} ends with {len(samples)} records: {self.reason}"

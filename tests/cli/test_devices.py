@@ -63,13 +63,13 @@ def search_timeouts(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 @pytest.fixture
 def patient(search_timeouts: Callable[..., None]) -> None:
     """Simulated instruments share a busy machine with other tests; real ones answer at once."""
-    search_timeouts(gauge=2.0, node=2.0, adapter=30.0, controller=10.0)
+    search_timeouts(gauge=1.0, node=2.0, adapter=30.0, controller=10.0)
 
 
 @pytest.fixture
 def hasty(search_timeouts: Callable[..., None]) -> None:
     """No answer is expected: there is nothing to wait for."""
-    search_timeouts(gauge=0.3, adapter=0.3)
+    search_timeouts(gauge=0.1, adapter=0.1)
 
 
 def test_a_machine_without_devices_is_told_what_to_plug_in(typed_here) -> None:

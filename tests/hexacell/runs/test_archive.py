@@ -78,7 +78,8 @@ def test_a_damaged_file_is_replaced(tmp_path, damage) -> None:
         assert archive.documents(SUMMARY) == ONE
 
 
-def test_what_cannot_be_used_says_so_and_is_left_alone(tmp_path) -> None:
+def test_what_cannot_be_used_says_so_and_is_left_alone(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr("hexacell.runs.archive.PATIENCE_S", 0.1)
     path = filled(tmp_path)
     before = path.read_bytes()
     with closing(sqlite3.connect(path)) as other:

@@ -23,7 +23,7 @@ GIVEN_UP_AT_ONCE = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0"}
 
 NO_SCHEDULER = "{}: no Dask scheduler answers. Start one there"
 NO_WORKERS = "{}: the Dask scheduler has no workers. Start some with `dask worker "
-SOON_S = 5.0
+SOON_S = 1.0
 LATE_S = 250.0
 
 

@@ -12,7 +12,6 @@ from drivers.simulated import robot
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.model import CellSettings
-from hexacell.design.candidate_refinement import QUICK
 from hexacell.design.search_effort import SearchEffort
 from hexacell.services import search_effort
 from procedures.steps import events
@@ -46,14 +45,7 @@ SMALL: dict[str, Any] = FREE | {
 """As few poses as identify it, by dotted keys of the cell file."""
 
 
-FEW_CHOICES = SearchEffort(
-    candidates=64,
-    pilot_candidates=64,
-    held_out_candidates=128,
-    checked_candidates=8,
-    checked_robots=4,
-    rounds=QUICK,
-)
+FEW_CHOICES = SearchEffort(candidates=64, held_out_candidates=128, checked_candidates=8, checked_robots=4)
 """Poses are chosen among few, and a plan is checked on few robots: what is chosen is not under test."""
 
 

@@ -87,9 +87,12 @@ def start(tmp_path: Path) -> Iterator[Start]:
         yield starting
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def served_cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """The cell file that ``simulate`` prints of a short cell, which it serves in another process."""
+    """The cell file that ``simulate`` prints of a short cell, which it serves in another process.
+
+    No longer than one file needs it: waiting for clients takes a hundredth of a processor.
+    """
     folder = tmp_path_factory.mktemp("served")
     cell = copy_cell(folder)
     cell.edit(*SHORT)

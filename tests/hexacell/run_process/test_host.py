@@ -113,6 +113,7 @@ async def place(client: Client) -> None:
     await client.connection.give(Answer("placed"))
 
 
+@pytest.mark.slow
 async def test_a_whole_run_is_told_and_commanded_over_the_socket(hosted) -> None:
     async with hosted() as run:
         client = await run.client()

@@ -77,6 +77,7 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DaskProcesses]:
         yield processes
 
 
+@pytest.mark.slow
 def test_tasks_of_a_killed_worker_are_done_again(tmp_path: Path) -> None:
     with dask_processes(tmp_path, 3) as cluster:
         carry_out = partial(square_unless_killed, folder=tmp_path)

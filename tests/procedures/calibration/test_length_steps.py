@@ -257,6 +257,7 @@ async def test_a_seat_out_of_reach_is_told_before_anything_moves(make_length_rig
     assert all("length check, seat " in str(failure) for failure in failures)
 
 
+@pytest.mark.slow
 async def test_a_run_checks_the_scale_before_its_verdict(make_rig) -> None:
     """1e-3 of all encoders: without the check the run passes, and errs by 0.2 mm."""
     changes = {

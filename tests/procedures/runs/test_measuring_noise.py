@@ -222,6 +222,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Rig:
     return rig
 
 
+@pytest.mark.slow
 def test_a_whole_run_with_a_noisy_gauge_passes(whole: Rig) -> None:
     """Without the measured noise the residuals would be too large for what is stated."""
     ended = read_journal(whole.folder.journal)[-1]
@@ -229,12 +230,14 @@ def test_a_whole_run_with_a_noisy_gauge_passes(whole: Rig) -> None:
     assert ended.exit_code == ExitCode.DONE
 
 
+@pytest.mark.slow
 def test_the_result_has_the_measured_noise(whole: Rig) -> None:
     (found,) = happened(whole, events.NoiseMeasured)
     result = json.loads(whole.folder.result.read_text())
     assert result["measured_noise"] == found.noise.model_dump(mode="json")
 
 
+@pytest.mark.slow
 def test_the_run_is_reproduced(whole: Rig, few_candidates: None, tmp_path: Path) -> None:
     """Until three records are taken with what the measured noise says."""
     history = history_until(read_journal(whole.folder.journal), events.RecordTaken, count=4)

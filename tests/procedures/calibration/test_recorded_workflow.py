@@ -93,7 +93,7 @@ def test_after_a_refusal_another_pose_is_chosen(recording, calibration) -> None:
     second = next_step(calibration, fold([*sampled, arrived, refused]))
     assert isinstance(second, Move)
     assert second.at == first.at
-    assert second.orientation in {0, 7}, "there, or on the way there"
+    assert second.orientation in {0, 1, 7}, "there, or on the way there, which may lead over the reference"
     assert second.pose != first.pose
 
 

@@ -79,7 +79,7 @@ async def test_a_move_with_gauges_at_the_ball_is_as_much_slower_as_stated(make_r
 async def test_in_a_whole_run_no_slider_and_no_point_of_the_platform_is_faster_than_allowed(
     recording, replayed
 ):
-    rig = replayed(recording.until(events.Identified))
+    rig = replayed(recording.until(events.SetClosed, count=1))
     fastest = {"joint": 0.0, "edge": 0.0}
     real = rig.machine.move
 

@@ -10,11 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hexacell.cell.bundled import CONTROLLER
 from hexacell.errors import Interruption
 from hexacell.runs.cell_lock import cell_lock
 from procedures.run.keys import Phase
 from procedures.steps import events
 
+CONFIGS = Path(__file__).parents[2] / "configs"
 MEASURED_TWICE = 6
 """Orientations at each held-out point, its reference included."""
 
@@ -221,3 +223,15 @@ def test_the_papers_experiment_passes_too(typed):
     outcome = typed("demo", "--config", "paper-experiment", "--json")
     assert outcome.code == 0, outcome.err
     assert "60 records at 3 points" in outcome.document["line"]
+
+
+@pytest.mark.slow
+def test_with_the_papers_repeatability_its_experiment_leaves_a_better_geometry(typed, tmp_path):
+    name = "paper-experiment.toml"
+    shutil.copy((CONFIGS / name).with_suffix(CONTROLLER), tmp_path)
+    text = (CONFIGS / name).read_text()
+    (tmp_path / name).write_text(text.replace("\nrepeatability_mm = 0.0", "\nrepeatability_mm = 0.4"))
+    outcome = typed("run", tmp_path / name, "--unattended", "--mode", "optimise", "--json")
+    assert outcome.code == 1, outcome.err
+    assert outcome.document["verdict"] == "not evaluated"
+    assert "the geometry is better, and stays" in outcome.document["line"]

@@ -5,8 +5,9 @@ All geometries are in the mechanism's frame convention, so that a choice of fram
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
+from statistics import median
 from typing import TYPE_CHECKING
 
 from hexacell.cell.model import CellSettings
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 
 SMALLEST_SIGMA = 0.002
-"""Of figures in mm or mrad that are known better than this, five decimals are shown."""
+"""Where most figures in mm or mrad are known better than this, five decimals are shown of all."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +33,7 @@ class ParameterRow:
     Attributes:
         old, new: its values; None in a check, which finds the change alone.
         doubt: why the change is no result; empty if it is one.
+        decimals: of the figures shown.
     """
 
     name: str
@@ -41,6 +43,7 @@ class ParameterRow:
     old: float | None = None
     new: float | None = None
     doubt: str = ""
+    decimals: int = 3
 
     @property
     def expanded(self) -> float:
@@ -63,8 +66,7 @@ class ParameterRow:
 
     def figure(self, value: float | None, sign: str = "") -> str:
         """A value in the unit shown, mm or mrad; empty for None."""
-        decimals = 3 if self.sigma / self.unit.like_a_mm >= SMALLEST_SIGMA else 5
-        return "" if value is None else f"{value / self.unit.like_a_mm:{sign}.{decimals}f}"
+        return "" if value is None else f"{value / self.unit.like_a_mm:{sign}.{self.decimals}f}"
 
 
 def parameter_rows(
@@ -81,7 +83,7 @@ def parameter_rows(
     ``undetermined`` are those that the records do not determine, ``held`` those that were not identified.
     """
     doubts = dict.fromkeys(undetermined, "not determined") | dict.fromkeys(held, "not identified")
-    return tuple(
+    return _with_decimals(
         ParameterRow(
             one.name,
             one.kind.unit,
@@ -94,6 +96,14 @@ def parameter_rows(
         for row, one in enumerate(parameters.parameters)
         if sigma[row] > 0.0
     )
+
+
+def _with_decimals(rows: Iterable[ParameterRow]) -> tuple[ParameterRow, ...]:
+    """Rows with as many decimals as most of them are worth."""
+    every = tuple(rows)
+    if every and median(one.sigma / one.unit.like_a_mm for one in every) < SMALLEST_SIGMA:
+        return tuple(replace(one, decimals=5) for one in every)
+    return every
 
 
 def rows_of_run(state: RunState, settings: CellSettings | None) -> tuple[ParameterRow, ...]:
@@ -116,7 +126,7 @@ def rows_of_run(state: RunState, settings: CellSettings | None) -> tuple[Paramet
 
 def rows_of_changes(changes: Sequence[ParameterChange | ParameterDifference]) -> tuple[ParameterRow, ...]:
     """The changes that a check found, or those from one run to another."""
-    return tuple(
+    return _with_decimals(
         ParameterRow(
             one.name,
             ParameterUnit(one.unit),

@@ -2,10 +2,10 @@
 
 import pytest
 
-from hexacell.kinematics.parameters import ParameterUnit
 from hexacell.lengths import MM, UM, from_to, shown, unit_of
+from hexacell.results.run_comparison import ParameterDifference
 from hexacell.text.layout import figure_with_u
-from hexacell.text.parameters import ParameterRow
+from hexacell.text.parameters import rows_of_changes
 from hexacell.uncertainty.statement import LargestError
 from hexacell.verdict.decision import JudgedError
 
@@ -51,7 +51,7 @@ def test_an_error_with_its_limit() -> None:
 
 
 def test_a_parameter_that_is_known_to_less_than_a_micrometre() -> None:
-    row = ParameterRow("l1", ParameterUnit.MM, change=0.00031, sigma=0.0002, old=580.0, new=580.00031)
+    (row,) = rows_of_changes([ParameterDifference("l1", "mm", 580.0, 580.00031, 0.0002)])
     assert [row.figure(one) for one in (row.new, row.change, row.sigma)] == [
         "580.00031",
         "0.00031",

@@ -13,7 +13,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.model import Robot, robot_of
 from tests.benchmarks.figures import DID_NOT_END, Figures
-from tests.benchmarks.machines import bundled, geometry_of_table_one
+from tests.benchmarks.machines import geometry_of_table_one, with_aligned_gauges
 
 MISSED = pytest.StashKey[Figures]()
 
@@ -29,7 +29,7 @@ class TableOne:
 
 @pytest.fixture(scope="session")
 def table_one() -> TableOne:
-    cell = bundled()
+    cell = with_aligned_gauges()
     points = np.array(cell.settings.identification.points)
     return TableOne(robot_of(cell), geometry_of_table_one(cell), points)
 

@@ -44,6 +44,13 @@ def bundled(name: str = "simulated-hexaglide") -> Cell:
     return load_cell(bundled_config(name))
 
 
+def with_aligned_gauges() -> Cell:
+    """The bundled cell with gauges exactly along the axes, as other methods and closed forms have them."""
+    cell = bundled()
+    stations = cell.settings.stations.model_copy(update={"alignment_deg": 0.0})
+    return replace(cell, settings=cell.settings.model_copy(update={"stations": stations}))
+
+
 def geometry_of_table_one(cell: Cell) -> Geometry:
     """What the paper identified, in the frames of its table."""
     assert cell.settings.simulation is not None

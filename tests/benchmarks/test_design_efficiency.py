@@ -30,7 +30,7 @@ from tests.benchmarks.continuous_design import (
     whitened,
 )
 from tests.benchmarks.figures import at_least
-from tests.benchmarks.machines import bundled, on_all_cores
+from tests.benchmarks.machines import on_all_cores, with_aligned_gauges
 from tests.benchmarks.samples import sample
 
 ROBOTS = sample(__name__, "ROBOTS")
@@ -56,7 +56,7 @@ class Rating:
 
 def rated(number: int) -> Rating | None:
     """A robot's adaptive campaign beside the best designs; None if it cannot be calibrated."""
-    cell = bundled()
+    cell = with_aligned_gauges()
     model = robot_of(cell)
     truth = random_robot(
         model.mechanism, model.drawing, model.tolerances, np.random.default_rng([SEED, number])

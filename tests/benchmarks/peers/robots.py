@@ -27,7 +27,7 @@ from hexacell.kinematics.sensitivity import has_singularity_margin
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot, robot_of
 from hexacell.study.data_sets import DataSet, unlimited_travel
-from tests.benchmarks.machines import bundled
+from tests.benchmarks.machines import with_aligned_gauges
 from tests.benchmarks.virtual_calibration import robot_that_reaches
 from tests.records_within_travel import within_travel
 from tests.simulated_campaign import SimulatedCampaign
@@ -104,7 +104,7 @@ class StudiedRobot:
 
         Its controller keeps the drawing while measuring, from which peers start.
         """
-        cell = bundled()
+        cell = with_aligned_gauges()
         identification = cell.settings.identification.model_copy(update={"provisional": False})
         cell = replace(cell, settings=cell.settings.model_copy(update={"identification": identification}))
         robot = robot_of(cell)

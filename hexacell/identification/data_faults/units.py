@@ -34,7 +34,9 @@ def wrong_unit(problem: Problem) -> DataFault | None:
     beyond = (usual > travel) & (usual / MM_PER_METRE < travel)
     # Gauges may have more travel than stated, but not so much more.
     is_far = (usual > FAR_BEYOND * travel)[beyond].all()
-    if beyond.any() and (is_far or _agrees(problem, beyond, 1.0 / MM_PER_METRE)):
+    as_um = 1.0 / MM_PER_METRE
+    # The longer search, for a geometry that micrometres fit, only where millimetres fit none.
+    if beyond.any() and (is_far or (not _agrees(problem, beyond, 1.0) and _agrees(problem, beyond, as_um))):
         evidence = (
             f"most readings exceed the travel of {travel[beyond].max():g} mm, and the largest is "
             f"{np.abs(readings[:, beyond]).max():.4g}"

@@ -8,6 +8,7 @@ import math
 import os
 import platform
 import subprocess
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -216,11 +217,14 @@ def table(figures: Iterable[Figure], present: str) -> str:
             marks += [] if one.commit.rstrip("+") == present.rstrip("+") else [f"at {one.commit}"]
             alike.setdefault((_module(one), _name(one), one.unit, ", ".join(marks)), []).append(one)
     rows = ["| benchmark | figure | measured | target |", "|---|---|---|---|"]
+    above = ""
     for (module, name, unit, target), ones in alike.items():
         benchmark = f"{module} {', '.join(dict.fromkeys(filter(None, map(_case, ones))))}"
         values = ", ".join(dict.fromkeys(one.shown.removesuffix(unit).strip() for one in ones))
-        cells = (benchmark, name, f"{values} {unit}", target)
-        rows.append(f"| {' | '.join(' '.join(cell.replace('|', '/').split()) for cell in cells)} |")
+        cells = ("" if benchmark == above else benchmark, name, f"{values} {unit}", target)
+        above = benchmark
+        row = f"| {' | '.join(' '.join(cell.replace('|', '/').split()) for cell in cells)} |"
+        rows.append(row.replace("|  |", "||", 1))
     missed = sum(not one.met for one in listed)
     counts = (
         f"{len(every)} figures, {len(listed)} of them with a target, of which {missed} were missed; "
@@ -252,7 +256,9 @@ def main() -> None:
     if not figures:
         print(f"hexacell: {TABLE.name} stays as it is: make bench has not written {FIGURES.name}")
         return
-    TABLE.write_text(table(figures, json.loads(FIGURES.read_text())["commit"]))
+    # Some benchmarks may have been run again after the pass over all of them.
+    [(commit_of_most, _)] = Counter(one.commit for one in figures).most_common(1)
+    TABLE.write_text(table(figures, commit_of_most))
     print(f"hexacell: {TABLE.relative_to(CHECKOUT)} has {len(figures)} figures")
 
 

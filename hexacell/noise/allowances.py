@@ -96,8 +96,7 @@ class Allowances:
 
     def between_visits(self, reference: Pose, visits: Array) -> tuple[ReferenceChange, ...]:
         """The changes between m visits (m, 9) of one reference, as m - 1 that are independent."""
-        count = len(visits)
-        rows = np.array([[1.0] * k + [-k] + [0.0] * (count - k - 1) for k in range(1, count)])
+        rows = np.array([[1.0] * k + [-k] + [0.0] * (len(visits) - k - 1) for k in range(1, len(visits))])
         contrasts = np.sqrt(2.0) * rows / np.linalg.norm(rows, axis=1, keepdims=True)
         return tuple(self.since(reference, np.zeros(9), one) for one in contrasts @ visits)
 
@@ -127,8 +126,8 @@ class Allowances:
         records = 2.0 * SAFETY_SIGMAS**2 * self._record_covariance(ball)
         stops = STOP_SIGMAS**2 * self.robot.noise.stop_covariance(ball.by_joints[None])[0]
         needed = 2.0 * float(np.sqrt(np.diag(records + stops).max())) / TRAVEL_SHARE
-        narrowest = min(gauge.travel_mm for gauge in self.settings.gauges)
-        travel = min(narrowest, 2.0 * self.settings.limits.gauge_travel_mm)
+        gauges, limits = self.settings.gauges, self.settings.limits
+        travel = min(2.0 * limits.gauge_travel_mm, *(gauge.travel_mm for gauge in gauges))
         if needed > travel:
             raise LimitError(
                 f"this machine does not repeat well enough for gauges of {travel:g} mm: the ball leaves "

@@ -42,6 +42,7 @@ encoder sees count at work. The residuals are many, so that few machines have th
 FEWEST = 5.0
 """Degrees of freedom that a size has at least: the likelihood of a small one has no peak to tell them."""
 
+NO_RESIDUALS = ChiSquareTest(0.0, 0.0)
 SIZES = np.geomspace(1e-2, 1e3, 400)
 """Of stops that are tried, as multiples of the noise of the encoders."""
 
@@ -116,7 +117,8 @@ class Repeats:
 
         It counts at work even where noise of all readings explains the changes better: that is the worst.
         """
-        if not (self._is_larger(SIGNIFICANCE) or self._is_likely):
+        is_likely = self.residuals is not None and self._is_larger(LIKELY, self.residuals)
+        if not (is_likely or self._is_larger(SIGNIFICANCE)):
             return UnseenStops(0.0, self.freedom, 0.0)
         sizes, stops = noise.encoder * SIZES, np.stack([one.by_stops for one in self.changes])
         covariances = self._covariances + (sizes**2)[:, None, None, None] * stops
@@ -138,21 +140,13 @@ class Repeats:
         effects = with_measured_stops(robot.effects, 1e3 * unseen.size, unseen.freedom, self.seen_freedom)
         return replace(robot, noise=self.applied_to(robot.noise), effects=effects)
 
-    def _is_larger(self, significance: float) -> bool:
-        if self.freedom < LEAST_FREEDOM or self.chi2 <= self.freedom:
-            return False
-        return bool(chi_square_exceedance(self.freedom, self.chi2) < significance)
-
-    @property
-    def _is_likely(self) -> bool:
-        if self.residuals is None or self.freedom < LEAST_FREEDOM:
-            return False
-        freedom, chi2 = self.freedom + self.residuals.expected, self.chi2 + self.residuals.chi2
-        return bool(chi_square_exceedance(freedom, chi2) < LIKELY)
+    def _is_larger(self, significance: float, residuals: ChiSquareTest = NO_RESIDUALS) -> bool:
+        freedom, chi2 = self.freedom + residuals.expected, self.chi2 + residuals.chi2
+        return self.freedom >= LEAST_FREEDOM and chi_square_exceedance(freedom, chi2) < significance
 
     @property
     def _factor(self) -> float:
-        return float(np.sqrt(self.chi2 / self.freedom))
+        return max(1.0, float(np.sqrt(self.chi2 / self.freedom)))
 
     @cached_property
     def _shown(self) -> Array:

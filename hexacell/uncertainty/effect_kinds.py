@@ -68,12 +68,8 @@ def with_measured_stops(
 ) -> tuple[Effect, ...]:
     """Effects with what repeated readings show of stops.
 
-    Args:
-        effects: those that are stated, and those seen by the encoders as they were measured.
-        unseen: of stops that encoders do not see, beyond what is stated, in um or mdeg. The noise of the
-            records contains it already.
-        freedom: degrees of freedom of that.
-        seen_freedom: of what the encoders see.
+    ``unseen`` is of those that encoders do not see, beyond what is stated, in um or mdeg, with its
+    degrees of ``freedom``. The noise of the records contains it already.
     """
 
     def measured(effect: Effect) -> Effect:
@@ -82,15 +78,10 @@ def with_measured_stops(
             return replace(effect, freedom=seen_freedom) if is_of_noise else effect
         # What is in the noise already is beside it; what is stated of every stop is not.
         size = float(np.hypot(unseen, effect.size)) if is_of_noise else unseen
-        if size <= effect.size:
-            return replace(effect, freedom=freedom) if is_of_noise else effect
-        return replace(
-            effect,
-            size=size,
-            occurrence=Occurrence.STOPS_AT_WORK,
-            source="repeated readings",
-            freedom=freedom,
-        )
+        if size > effect.size:
+            at_work, source = Occurrence.STOPS_AT_WORK, "repeated readings"
+            return replace(effect, size=size, occurrence=at_work, source=source, freedom=freedom)
+        return replace(effect, freedom=freedom) if is_of_noise else effect
 
     return tuple(map(measured, effects))
 

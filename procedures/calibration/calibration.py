@@ -265,8 +265,7 @@ class Knowledge:
         identifying = replace(self.identifying.robot, noise=robot.noise)
         allowances = Allowances(self.calibration.settings, identifying, is_measured=True, found=found)
         changes = repeated_readings(state, self.calibration.plan, allowances)
-        repeats = Repeats.of(noise.approaches, [*changes], robot.noise, found)
-        return repeats.applied_to_robot(robot)
+        return Repeats.of(noise.approaches, [*changes], robot.noise, found).applied_to_robot(robot)
 
     def provisional_geometry(self, state: RunState) -> Geometry:
         """The estimate by now, or the provisional geometry that the run applied before an interruption.

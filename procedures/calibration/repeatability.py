@@ -58,11 +58,10 @@ def repeated_readings(state: RunState, plan: Plan, allowances: Allowances) -> It
 
 
 def noise_again(plan: Plan, state: RunState, found: Identification) -> MeasuredNoise | None:
-    """The measured noise by the visits, with the geometry that was identified; None where there is none."""
-    measured = None if state.noise is None else state.noise.noise
-    if measured is None or (visits := _visits(plan, state)) is None:
-        return measured
-    return assess_again(plan, visits, measured, found)
+    """The measured noise by the visits, with the geometry that was identified; None without."""
+    if state.noise is None or (visits := _visits(plan, state)) is None:
+        return None
+    return assess_again(plan, visits, state.noise.noise, found)
 
 
 def _visits(plan: Plan, state: RunState) -> NoiseReadings | None:

@@ -7,10 +7,10 @@
 
 PYTHON = python3
 ARGS =
-# Tests of devices mostly wait, so that four processes keep two cores busy. In the order of the folders
+# Tests of devices mostly wait, so that five processes keep two cores busy. In the order of the folders
 # the long files come early; by default files with few tests, which are the long ones, would come last.
-FOUR_AT_A_TIME = -n 4 --dist loadfile --no-loadscope-reorder
-# Not even imported, by each of the four.
+SEVERAL_AT_A_TIME = -n 5 --dist loadfile --no-loadscope-reorder
+# Not even imported, by each of them.
 ELSEWHERE = --ignore=tests/benchmarks --ignore=tests/linuxcnc
 RUN = .venv/bin/python -m
 
@@ -29,10 +29,10 @@ demo: venv
 	.venv/bin/hexacell demo $(ARGS)
 
 test: venv
-	$(RUN) pytest $(FOUR_AT_A_TIME) $(ELSEWHERE) -m "not slow and not benchmark and not linuxcnc" $(ARGS)
+	$(RUN) pytest $(SEVERAL_AT_A_TIME) $(ELSEWHERE) -m "not slow and not benchmark and not linuxcnc" $(ARGS)
 
 test-full: venv
-	$(RUN) pytest $(FOUR_AT_A_TIME) $(ELSEWHERE) -m "not benchmark and not linuxcnc" $(ARGS)
+	$(RUN) pytest $(SEVERAL_AT_A_TIME) $(ELSEWHERE) -m "not benchmark and not linuxcnc" $(ARGS)
 
 # One pass over all benchmarks, half an hour on two cores, that goes on where one fails or misses its target. The
 # figures go into build/figures.json. FULL=1 takes the samples of the targets, for hours (tests/benchmarks/samples.py).

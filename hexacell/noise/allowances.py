@@ -96,9 +96,11 @@ class Allowances:
 
     def between_visits(self, reference: Pose, visits: Array) -> tuple[ReferenceChange, ...]:
         """The changes between m visits (m, 9) of one reference, as m - 1 that are independent."""
-        rows = np.array([[1.0] * k + [-k] + [0.0] * (len(visits) - k - 1) for k in range(1, len(visits))])
-        contrasts = np.sqrt(2.0) * rows / np.linalg.norm(rows, axis=1, keepdims=True)
-        return tuple(self.since(reference, np.zeros(9), one) for one in contrasts @ visits)
+        contrasts = (
+            np.sqrt(2.0 * k / (k + 1.0)) * (visits[:k].mean(axis=0) - visits[k])
+            for k in range(1, len(visits))
+        )
+        return tuple(self.since(reference, np.zeros(9), one) for one in contrasts)
 
     def mounting_mm(self, reference: Pose) -> Array:
         """How far each plunger (3,) may stand from the middle of its travel when the gauges are zeroed.

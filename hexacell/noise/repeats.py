@@ -141,8 +141,10 @@ class Repeats:
         return replace(robot, noise=self.applied_to(robot.noise), effects=effects)
 
     def _is_larger(self, significance: float, residuals: ChiSquareTest = NO_RESIDUALS) -> bool:
+        if self.freedom < LEAST_FREEDOM:
+            return False
         freedom, chi2 = self.freedom + residuals.expected, self.chi2 + residuals.chi2
-        return self.freedom >= LEAST_FREEDOM and chi_square_exceedance(freedom, chi2) < significance
+        return chi_square_exceedance(freedom, chi2) < significance
 
     @property
     def _factor(self) -> float:

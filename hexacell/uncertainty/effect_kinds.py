@@ -81,7 +81,7 @@ def with_measured_stops(
         if size > effect.size:
             at_work, source = Occurrence.STOPS_AT_WORK, "repeated readings"
             return replace(effect, size=size, occurrence=at_work, source=source, freedom=freedom)
-        return replace(effect, freedom=freedom) if is_of_noise else effect
+        return replace(effect, freedom=freedom) if is_of_noise and freedom else effect
 
     return tuple(map(measured, effects))
 

@@ -61,6 +61,13 @@ def test_joints_that_stop_beside_what_encoders_show_are_told_from_noisy_readings
     assert np.mean([one.gauge_mm == pytest.approx(NOISE.gauge_mm) for one in noise]) > 0.8
 
 
+def test_no_repeats_prove_nothing() -> None:
+    """Where a reference was visited once, and no point was finished."""
+    none = Repeats.of(None, (), NOISE)
+    assert none.applied_to(NOISE) == NOISE
+    assert none.unseen_stops(NOISE).size == 0.0
+
+
 def test_repeats_as_stated_prove_no_stops() -> None:
     random = np.random.default_rng(4)
     assert np.mean([repeats(1.0, random).unseen_stops(NOISE).size == 0.0 for _ in range(300)]) > 0.95

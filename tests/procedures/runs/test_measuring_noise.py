@@ -318,3 +318,18 @@ async def test_a_device_that_fails_meanwhile_costs_no_more_than_its_recovery(ask
     is_lost = action != "retry" and kind is not Standstill  # a gauge that is opened again has lost its zero
     assert len(happened(asked, events.StandstillRead)) == (2 if is_lost else 1)
     assert len(state.set(P1).visits) == 6
+
+
+@pytest.mark.parametrize("revisits", [0, 1])
+async def test_a_run_that_visits_its_reference_hardly_ends_with_a_verdict(
+    make_rig: MakeRig, revisits: int
+) -> None:
+    """Readings at rest alone are no repeats."""
+    rig = make_rig(noise__standstill_readings=16, noise__revisits=revisits)
+    await rig.run()
+    assert len(happened(rig, events.NoiseMeasured)) == 1
+    (judged,) = happened(rig, events.ResultValidated)
+    assert isinstance(judged, events.ResultValidated)
+    assert judged.verification is not None
+    assert judged.verification.accuracy is not None
+    assert np.isfinite(judged.verification.accuracy.position.expanded)

@@ -76,10 +76,8 @@ class AskedOfLimit:
 
     def corrected_in(self, cell: Cell) -> Cell:
         """The cell with the limit in the right unit."""
-        values, limits = (
-            {field: self.factor * value for field, value in self.ends.items()},
-            cell.settings.limits,
-        )
+        limits = cell.settings.limits
+        values = {field: self.factor * value for field, value in self.ends.items()}
         if "axes" in self.path:
             ends = {str(self.path[-1]): (values["min"], values["max"])}
             return _with_limits(cell, axes=limits.axes.model_copy(update=ends))

@@ -66,10 +66,8 @@ def accuracy_table(assessed: Assessment) -> str:
     if accuracy is None:
         return ""
     what = "task poses" if assessed.task_named else "poses across the workspace"
-    title, unit = (
-        f"Predicted error at {len(accuracy.poses)} {what}",
-        unit_of(accuracy.after.position_largest_mm),
-    )
+    title = f"Predicted error at {len(accuracy.poses)} {what}"
+    unit = unit_of(accuracy.after.position_largest_mm)
     lines = [
         f"{title:44}{f'position, {unit.name}':>17}{'angle, deg':>18}",
         f"{'':44}{'rms':>8}{'largest':>9}{'rms':>9}{'largest':>9}",

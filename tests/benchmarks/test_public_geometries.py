@@ -4,7 +4,7 @@ They are precise or small, and the tolerances alone determine many of their para
 error at their task poses.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -12,8 +12,6 @@ import pytest
 
 from hexacell.cell.loader import load_cell
 from hexacell.robot.model import robot_of
-from hexacell.verdict.acceptance_gates import gates
-from hexacell.verdict.decision import Verdict
 from tests.benchmarks.figures import NEVER, at_least, least_by_chance
 from tests.benchmarks.machines import on_all_cores
 from tests.benchmarks.samples import sample
@@ -24,51 +22,29 @@ ROBOTS = sample(__name__, "ROBOTS")
 PATHS = {path.stem: path for path in CELLS}
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """What came of a robot; ``waits``: what keeps its geometry from being written without a person."""
-
-    judged: Judged
-    waits: tuple[str, ...] = ()
-
-    @property
-    def is_stopped_within(self) -> bool:
-        """Whether a run would end without its geometry, though U at the task is within the limit."""
-        return bool(self.waits) and not self.judged.u_mm > self.judged.limit_mm
-
-
-def outcome(name: str, number: int) -> Outcome:
+def outcome(name: str, number: int) -> Judged:
     cell, random = load_cell(PATHS[name]), np.random.default_rng([19, number])
     robot = robot_of(cell)
     one = judged(cell, robot, robot_that_stands(cell, robot, random), random, by_derivatives)
-    if one.done is None:
-        return Outcome(one, (one.reason,))
-    found = one.done.found
-    conditions = gates(
-        found.estimate,
-        robot.tolerance_violations(found.estimate),
-        residuals=found.goodness,
-        change_mm=robot.largest_change(found.geometry),
-        largest_change_mm=cell.settings.acceptance.largest_change_mm,
-    )
     # What it consists of cannot be sent to another process.
-    return Outcome(replace(one, done=None), tuple(gate.sentence for gate in conditions if not gate.passed))
+    return replace(one, done=None)
+
+
+def waits(one: Judged) -> str:
+    """What keeps a geometry from being written without a person; empty where nothing does."""
+    return " ".join(one.unmet) if one.verdict is not None else one.reason
 
 
 @pytest.mark.parametrize("name", PATHS)
 def test_others_of_the_same_drawing_are_written_and_none_is_wrong(figure, name: str) -> None:
     every = on_all_cores(partial(outcome, name), range(ROBOTS))
     for number, one in enumerate(every):
-        of = one.judged
-        if one.waits or of.verdict is not Verdict.PASS:
-            figure(
-                f"  robot {number}: U {of.u_mm:.4f} mm; {of.reason} {' '.join(one.waits)}", of.true_mm, "mm"
-            )
-    known = [one.judged for one in every if np.isfinite(one.judged.true_mm)]
-    stopped = sum(one.is_stopped_within for one in every)
+        if not one.is_accepted:
+            figure(f"  robot {number}: U {one.u_mm:.4f} mm; {one.reason} {waits(one)}", one.true_mm, "mm")
+    known = [one for one in every if np.isfinite(one.true_mm)]
+    stopped = sum(bool(waits(one)) and not one.u_mm > one.limit_mm for one in every)
     figure(f"{name}: refused or waiting though U is within the limit", stopped, f"of {ROBOTS}", NEVER)
-    passes = sum(one.judged.verdict is Verdict.PASS and not one.waits for one in every)
-    figure(f"{name}: pass without a person", passes, f"of {ROBOTS}")
+    figure(f"{name}: pass without a person", sum(one.is_accepted for one in every), f"of {ROBOTS}")
     false = sum(one.is_false_pass for one in known)
     figure(f"{name}: passes though the true error is above the limit", false, "", NEVER)
     covered, least = sum(one.is_covered for one in known), at_least(least_by_chance(0.93, len(known)))

@@ -11,16 +11,14 @@ from typing import Any, Self
 from rich.console import Console as RichConsole
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from hexacell.campaign.decisions import Forecast
 from hexacell.cli.console import Console
 from hexacell.run_process.live_devices import RunDeviceWatch
 from hexacell.text.layout import wrapped
-from hexacell.text.line_face import EventFormatter, activity, gauges_text, record_text, run_status_text
+from hexacell.text.line_face import EventFormatter, activity, gauges_text, record_text
 from procedures.run.cancellation import cancel_and_wait
 from procedures.run.state import RunState
 from procedures.steps import events
 from procedures.steps.commit import Commit
-from procedures.steps.move import Move
 from procedures.steps.place import Place
 
 PLAIN_TERMINALS = {"dumb", "unknown"}
@@ -32,12 +30,11 @@ class RunProgress:
 
     Attributes:
         has_started: whether the run exists on the disk, and so can be resumed.
-        expected: number of records and closings of sets that are planned.
     """
 
     def __init__(self, console: Console, expected_records: int) -> None:
         self.has_started = False
-        self.expected = expected_records
+        self._expected = expected_records
         self._console = console
         self._formatter = EventFormatter()
         self.bar = _bar()
@@ -58,8 +55,12 @@ class RunProgress:
         for line in self._formatter.lines(event, state):
             self._console.print(line)
         if self._is_plain and isinstance(event, events.RecordTaken):
-            line = f"{state.completed} of {self.expected}: {record_text(event)}"
+            line = f"{state.completed} of {self._expected}: {record_text(event)}"
             self._console.print(wrapped(line, indent=2))
+
+    def print_status(self) -> None:
+        """Print where the run is."""
+        self._console.print(self._formatter.status_text(self._expected))
 
     def hide(self) -> None:
         """Remove the bar until the next event, so that a question can be shown."""
@@ -104,28 +105,14 @@ def _bar() -> Progress:
 
 
 class RunAnswers:
-    """Answers what a person at a plain terminal asks during a run, without delaying it.
+    """Prints what the gauges show whenever a person at a plain terminal asks, without delaying the run.
 
-    A listener of the engine, used as ``async with``.
+    Used as ``async with``.
     """
 
-    def __init__(self, console: Console, watching: RunDeviceWatch, expected_records: int) -> None:
-        self._console, self._watching, self._expected = console, watching, expected_records
+    def __init__(self, console: Console, watching: RunDeviceWatch) -> None:
+        self._console, self._watching = console, watching
         self._tasks: set[asyncio.Task[None]] = set()
-        self._state = RunState()
-        self._doing: str | None = None
-        self._last: events.RecordTaken | None = None
-        self._forecast: Forecast | None = None
-
-    def __call__(self, event: events.Event, state: RunState) -> None:
-        """Remember where the run is."""
-        self._state = state
-        self._doing = activity(event) or self._doing
-        match event:
-            case events.RecordTaken():
-                self._last = event
-            case events.StepBegun(step=Move(expected=expected)) if expected is not None:
-                self._forecast = expected.forecast or self._forecast
 
     async def __aenter__(self) -> Self:
         self._begin(self._note_noise())
@@ -137,12 +124,6 @@ class RunAnswers:
         self._watching.close()
         for task in tuple(self._tasks):
             await cancel_and_wait(task)
-
-    def print_status(self) -> None:
-        """Print where the run is."""
-        self._console.print(
-            run_status_text(self._doing, self._state, self._expected, self._last, self._forecast)
-        )
 
     def print_gauges(self) -> None:
         """Print what the gauges show, as soon as they are read."""

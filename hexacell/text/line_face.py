@@ -47,28 +47,6 @@ LETTERS = (
 )
 
 
-def run_status_text(
-    doing: str | None,
-    state: RunState,
-    expected: int,
-    last: events.RecordTaken | None,
-    forecast: Forecast | None,
-) -> str:
-    """Where a run is: what it does, how far it is, its last record, its accuracy and the time left."""
-    lines = [
-        f"Now: {doing or 'connecting'}",
-        f"Done: {state.completed} of {max(expected, state.completed)} records and closings of points",
-    ]
-    if last is not None:
-        lines.append(f"Last record: {record_text(last)}")
-    if forecast is not None:
-        left = f", {duration(forecast.minutes)} left" if forecast.minutes > 0.0 else ""
-        unit = unit_of(forecast.now_mm, forecast.end_mm)
-        errors = f"{unit.length(forecast.now_mm)} now, {unit.length(forecast.end_mm)} at the end"
-        lines.append(f"Predicted error at the task: {errors}{left}")
-    return "\n".join(wrapped(line, indent=2) for line in lines)
-
-
 def record_text(record: events.RecordTaken) -> str:
     """A record in a line: where, and how far the ball was from the point's reference."""
     x, y, z = record.deviation_mm
@@ -137,23 +115,46 @@ def request_text(question: Question) -> str:
 
 
 class EventFormatter:
-    """Turns the events of one run, in their order, into lines of text."""
+    """Turns the events of one run, in their order, into lines of text; and says where the run is."""
 
     def __init__(self) -> None:
+        self._state = RunState()
+        self._doing: str | None = None
+        self._last: events.RecordTaken | None = None
         self._forecast: Forecast | None = None
 
     def lines(self, event: events.Event, state: RunState) -> list[str]:
         """Text of an event; ``state`` includes the event. Empty where there is nothing to report."""
-        return [text for text in (event_text(event, state), self._forecast_line(event)) if text]
-
-    def _forecast_line(self, event: events.Event) -> str | None:
-        """The predicted error, once the set whose last move predicted it is closed."""
+        self._state, self._doing = state, activity(event) or self._doing
+        forecast = None
         match event:
+            case events.RecordTaken():
+                self._last = event
             case events.StepBegun(step=Move(expected=expected)) if expected is not None:
                 self._forecast = expected.forecast
             case events.SetClosed(at=SetKey(phase=Phase.IDENTIFY)) if self._forecast is not None:
-                return run_forecast_line(self._forecast)
-        return None
+                # Of the move before it, which predicted the error with this set.
+                forecast = run_forecast_line(self._forecast)
+        return [text for text in (event_text(event, state), forecast) if text]
+
+    def status_text(self, expected: int) -> str:
+        """Where the run is: what it does, how far it is, its last record, its accuracy and the time left.
+
+        ``expected`` is how many records and closings of points are planned.
+        """
+        done = self._state.completed
+        lines = [
+            f"Now: {self._doing or 'connecting'}",
+            f"Done: {done} of {max(expected, done)} records and closings of points",
+        ]
+        if self._last is not None:
+            lines.append(f"Last record: {record_text(self._last)}")
+        if (forecast := self._forecast) is not None:
+            left = f", {duration(forecast.minutes)} left" if forecast.minutes > 0.0 else ""
+            unit = unit_of(forecast.now_mm, forecast.end_mm)
+            errors = f"{unit.length(forecast.now_mm)} now, {unit.length(forecast.end_mm)} at the end"
+            lines.append(f"Predicted error at the task: {errors}{left}")
+        return "\n".join(wrapped(line, indent=2) for line in lines)
 
 
 def activity(event: events.Event) -> str | None:

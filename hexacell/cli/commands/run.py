@@ -176,13 +176,13 @@ async def _calibrate(
         with ended_in_time(request, queue):
             return await calibrate(request, [*further, progress], queue)
     watching = RunDeviceWatch(request.cell.settings.gauges)
-    answers = RunAnswers(console, watching, progress.expected)
-    letters = {"g": answers.print_gauges, "s": answers.print_status}
+    answers = RunAnswers(console, watching)
+    letters = {"g": answers.print_gauges, "s": progress.print_status}
     keys = KeyboardCommands(console, queue.put, sys.stdin, letters)
     request.operator.before_question, request.operator.after_question = progress.hide, keys.listen
     request.operator.type_command = keys.take
     console.print(LETTERS)
-    listeners: list[Listener] = [*further, progress, keys, answers, watching.note]
+    listeners: list[Listener] = [*further, progress, keys, watching.note]
     run = calibrate(request, listeners, queue, watching.live, watching.follow)
     async with answers:
         return await keys.listen_during(run)

@@ -10,10 +10,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
 from hexacell.errors import ExitCode, UsageError
 
 _TIME = re.compile(r"([01][0-9]|2[0-3]):([0-5][0-9])")
 MOST_MINUTES = 24 * 60
+STOPPING_S = 120
+"""So long a run may take to stop the robot and to keep its journal before it is killed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +84,7 @@ def time_of_day(text: str) -> tuple[int, int]:
 
 def crontab_line(run: ScheduledRun) -> str:
     """The line. Cron takes % for a line's end, has no retries, and mails what is printed."""
-    longest = ("timeout", "--signal=TERM", "--kill-after=120", f"{run.longest_minutes}m")
+    longest = ("timeout", "--signal=TERM", f"--kill-after={STOPPING_S}", f"{run.longest_minutes}m")
     begun = f"cd {shlex.quote(str(run.cell.parent))} && {shlex.join([*longest, *run.words])} </dev/null"
     command = f"{begun}; {shlex.join(run.words_afterwards)}" if run.metrics else begun
     escaped = command.replace("%", "\\%")
@@ -90,85 +94,39 @@ def crontab_line(run: ScheduledRun) -> str:
 MARK = "# Written by `hexacell schedule` for "
 """The first line of a unit, before the path of its cell file: no other file is replaced or removed."""
 
-STOPPING_S = 120
-"""So long a run may take to stop the robot and to keep its journal before it is killed."""
-
 WORTH_ANOTHER_TRY = (ExitCode.HARDWARE, ExitCode.BUSY)
-
-HARDENING = (
-    "NoNewPrivileges=yes",
-    "CapabilityBoundingSet=",
-    "ProtectSystem=strict",
-    "ProtectHome=read-only",
-    "ProtectClock=no",
-    "ProtectKernelTunables=yes",
-    "ProtectKernelModules=yes",
-    "ProtectKernelLogs=yes",
-    "ProtectControlGroups=yes",
-    "RestrictNamespaces=yes",
-    "RestrictRealtime=yes",
-    "RestrictSUIDSGID=yes",
-    "LockPersonality=yes",
-    "RestrictAddressFamilies=AF_UNIX AF_INET AF_INET6 AF_CAN",
-    "SystemCallArchitectures=native",
-    "UMask=0077",
-)
-"""Settings of a system's service. ProtectClock would take the serial lines away; the families are those of
-controllers and CAN."""
-
 
 TEMPORARY = (Path("/tmp"), Path("/var/tmp"))  # noqa: S108 - what PrivateTmp hides
 
 
 def service_text(run: ScheduledRun, user: str | None, groups: Sequence[str]) -> str:
     """The service; of the system for a ``user`` with some ``groups``, else of the user who enables it."""
-    unit = ["[Unit]", f"Description=hexacell: {_plain(run.mode)} of {_plain(run.name)}"]
-    unit += [f"OnFailure={run.on_failure}"] if run.on_failure else []
-    unit += [f"StartLimitIntervalSec={(run.retries + 1) * (run.longest_minutes + run.retry_minutes)}min"]
-    unit += [f"StartLimitBurst={run.retries + 1}"]
-    service = [
-        "[Service]",
-        "Type=oneshot",
-        f"ExecStart={_command(run.words)}",
-        *([f"ExecStopPost={_command(run.words_afterwards)}"] if run.metrics else []),
-        f"WorkingDirectory={_plain(str(run.cell.parent))}",
-        f"TimeoutStartSec={run.longest_minutes}min",
-        f"TimeoutStopSec={STOPPING_S}",
-        "KillSignal=SIGTERM",
-        "StandardInput=null",
-    ]
-    if run.retries:  # only after failures that may pass by themselves, not after a verdict
-        others = [code for code in ExitCode if code not in {*WORTH_ANOTHER_TRY, ExitCode.DONE}]
-        final = " ".join(str(int(code)) for code in others)
-        service += ["Restart=on-failure", f"RestartSec={run.retry_minutes}min"]
-        service += [f"RestartPreventExitStatus={final} SIGTERM"]
-    if user is not None:
-        service += [f"User={_plain(user)}"]
-        service += [f"SupplementaryGroups={' '.join(groups)}"] if groups else []
+    return _unit(
+        "run.service.j2",
+        run,
+        user=user,
+        groups=groups,
+        final=[int(code) for code in ExitCode if code not in {*WORTH_ANOTHER_TRY, ExitCode.DONE}],
         # A cell below a temporary folder is seen only in the folder that all share.
-        is_temporary = any(one.is_relative_to(folder) for one in run.writable for folder in TEMPORARY)
-        service += [*HARDENING, "PrivateTmp=no" if is_temporary else "PrivateTmp=yes"]
-        service += [f"ReadWritePaths={_quoted(str(one))}" for one in run.writable]
-    return _file(run, [*unit, "", *service])
+        is_temporary=any(one.is_relative_to(folder) for one in run.writable for folder in TEMPORARY),
+    )
 
 
 def timer_text(run: ScheduledRun) -> str:
-    """The timer. A night that the computer slept through is made up for once it runs."""
-    return _file(
-        run,
-        [
-            "[Unit]",
-            f"Description=hexacell: daily {_plain(run.mode)} of {_plain(run.name)}",
-            "",
-            "[Timer]",
-            f"OnCalendar=*-*-* {run.hour:02}:{run.minute:02}:00",
-            "Persistent=yes",
-            "AccuracySec=1min",
-            "",
-            "[Install]",
-            "WantedBy=timers.target",
-        ],
+    """The timer."""
+    return _unit("run.timer.j2", run)
+
+
+def _unit(template: str, run: ScheduledRun, **values: object) -> str:
+    environment = Environment(  # noqa: S701 - units are no HTML
+        loader=FileSystemLoader(Path(__file__).parent),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
     )
+    environment.filters |= {"plain": _plain, "quoted": _quoted, "command": _command}
+    return environment.get_template(template).render(mark=MARK, run=run, stopping_s=STOPPING_S, **values)
 
 
 def cell_of(unit_text: str) -> Path | None:
@@ -177,13 +135,9 @@ def cell_of(unit_text: str) -> Path | None:
     return Path(first.removeprefix(MARK)) if first.startswith(MARK) else None
 
 
-def _file(run: ScheduledRun, lines: Sequence[str]) -> str:
-    return "\n".join([f"{MARK}{run.cell}", *lines]) + "\n"
-
-
-def _plain(text: str) -> str:
+def _plain(text: object) -> str:
     """A value of one line; only % has a meaning there."""
-    return text.replace("%", "%%")
+    return str(text).replace("%", "%%")
 
 
 def _command(words: Sequence[str]) -> str:
@@ -191,6 +145,6 @@ def _command(words: Sequence[str]) -> str:
     return " ".join(_quoted(word).replace("$", "$$") for word in words)
 
 
-def _quoted(text: str) -> str:
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+def _quoted(text: object) -> str:
+    escaped = str(text).replace("\\", "\\\\").replace('"', '\\"')
     return f'"{_plain(escaped)}"'

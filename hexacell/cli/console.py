@@ -3,7 +3,9 @@
 import json
 import os
 import sys
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, is_dataclass
+from datetime import datetime
+from pathlib import Path
 from typing import Any, TextIO
 
 
@@ -32,12 +34,25 @@ class Console:
     def document(self, document: dict[str, Any]) -> None:
         """The command's one JSON document; nothing without ``--json``."""
         if self.wants_json:
-            _write(sys.stdout, json.dumps(document) + "\n")
+            _write(sys.stdout, json.dumps(document, default=_plain) + "\n")
 
     def show(self, document: dict[str, Any], text: str) -> None:
         """The result of the command: its document, and the same as text."""
         self.document(document)
         self.print(text)
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401 - what a document has
+    """What JSON has no word for: a model, a dataclass, a moment, a path."""
+    if hasattr(value, "model_dump"):  # of pydantic, which takes long to import
+        return value.model_dump(mode="json")
+    if is_dataclass(value) and not isinstance(value, type):
+        return asdict(value)
+    if isinstance(value, datetime):
+        return value.isoformat()
+    if isinstance(value, Path):
+        return str(value)
+    raise TypeError(f"{value!r} belongs in no document")
 
 
 def _write(stream: TextIO | None, text: str) -> None:

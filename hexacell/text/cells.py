@@ -15,7 +15,7 @@ from hexacell.services.history.cell_status import (
     summary_of,
 )
 from hexacell.text.history import legs_text
-from hexacell.text.layout import error_with_u, figure_with_u, iso, minute, verdict_word
+from hexacell.text.layout import error_with_u, figure_with_u, minute, verdict_word
 from hexacell.verdict.decision import Verdict
 
 LONGEST_NAME = 22
@@ -55,7 +55,7 @@ def status_document(
     found: Sequence[CellStatus], unreadable: Sequence[UnreadableCell] = ()
 ) -> dict[str, Any]:
     """What ``status --json`` prints."""
-    broken = [{"cell": str(one.path), "error": str(one.error)} for one in unreadable]
+    broken = [{"cell": one.path, "error": str(one.error)} for one in unreadable]
     return {"cells": [_document(one) for one in found], "unreadable": broken}
 
 
@@ -97,17 +97,17 @@ def _document(one: CellStatus) -> dict[str, Any]:
     judged, worst = summary_of(one.judged), one.worst_share
     position = judged.position
     return {
-        "cell": str(one.cell.path),
+        "cell": one.cell.path,
         "name": one.cell.settings.name,
         "in_use_by": one.in_use_by,
-        "verdict": judged.verdict and judged.verdict.value,
+        "verdict": judged.verdict,
         "position_mm": position and position.value,
         "expanded_mm": position and position.expanded,
-        "judged_at": iso(judged.ended),
-        "passed_at": iso(one.passed_at),
-        "in_force": one.in_force and str(one.in_force.folder.path),
-        "due_at": iso(one.due_at),
-        "proposal": one.proposal and str(one.proposal.folder.path),
+        "judged_at": judged.ended,
+        "passed_at": one.passed_at,
+        "in_force": one.in_force and one.in_force.folder.path,
+        "due_at": one.due_at,
+        "proposal": one.proposal and one.proposal.folder.path,
         "not_begun": one.latest.summary.line if one.latest and not one.latest.summary.has_begun else None,
         "changes": len(one.drift.changes),
         "largest_sum": worst and {"parameter": worst[0], "ratio": worst[1]},
@@ -188,9 +188,9 @@ def _fleet_run_document(one: FleetRun) -> dict[str, Any]:
         "host": one.host,
         "run": one.name,
         "mode": was.mode,
-        "began": iso(was.began),
-        "ended": iso(was.ended),
-        "verdict": was.verdict and was.verdict.value,
+        "began": was.began,
+        "ended": was.ended,
+        "verdict": was.verdict,
         "position_mm": position and position.value,
         "expanded_mm": position and position.expanded,
     }

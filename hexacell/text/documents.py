@@ -1,4 +1,7 @@
-"""The JSON documents that commands print for programs (``docs/interface.md``)."""
+"""The JSON documents that commands print for programs (``docs/interface.md``).
+
+Moments, paths, dataclasses and models in them become JSON where they are printed.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,6 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from hexacell.campaign.decisions import Finished, StartPoint
-from hexacell.text.layout import iso
 from hexacell.text.verdict import teaching_sentence
 
 if TYPE_CHECKING:
@@ -33,7 +35,7 @@ def next_document(proposed: NextPose) -> dict[str, Any]:
     """What ``next --json`` prints."""
     decision, forecast = proposed.decision, proposed.forecast
     now = {
-        "left_out": [list(record) for record in proposed.left_out],
+        "left_out": proposed.left_out,
         "present_worst_sigma_mm": forecast and forecast.now_mm,
         "present_expanded_mm": forecast and forecast.expanded_mm(forecast.now_mm),
     }
@@ -47,18 +49,18 @@ def next_document(proposed: NextPose) -> dict[str, Any]:
         record = {
             "orientation": decision.orientation,
             "reference": False,
-            "predicted_deviation": list(decision.deviation),
-            "sigma": list(decision.sigma),
+            "predicted_deviation": decision.deviation,
+            "sigma": decision.sigma,
             "gain": decision.gain,
-            "via": [asdict(pose) for pose in decision.via],
+            "via": decision.via,
         }
     return {
         "done": False,
         **now,
         "point": decision.point,
         **record,
-        "pose": asdict(decision.pose),
-        "joint_targets": list(decision.joints),
+        "pose": decision.pose,
+        "joint_targets": decision.joints,
         "predicted_worst_sigma_mm": forecast and forecast.next_mm,
         "going_on": forecast
         and {
@@ -75,18 +77,17 @@ def preflight_document(devices: Sequence[DeviceIdentity], trial: PlanTrial) -> d
     """What ``preflight --json`` prints."""
     expected = {
         **asdict(trial.result),
-        "averaging": [one.model_dump() for one in trial.averaging],
+        "averaging": trial.averaging,
         "encoders_part_mm": trial.encoders_part_mm,
-        "lost": {str(point): share for point, share in trial.unreachable.items()},
+        "lost": trial.unreachable,
     }
-    return {"ready": True, "devices": [asdict(one) for one in devices], "expected": expected}
+    return {"ready": True, "devices": devices, "expected": expected}
 
 
 def quick_preflight_document(devices: Sequence[DeviceIdentity], trial: QuickTrial) -> dict[str, Any]:
     """What ``preflight --mode quick --json`` prints."""
-    accuracy = trial.accuracy and trial.accuracy.model_dump(mode="json")
-    expected = {"points": trial.points, "minutes": trial.minutes, "quick": accuracy}
-    return {"ready": True, "devices": [asdict(one) for one in devices], "expected": expected}
+    expected = {"points": trial.points, "minutes": trial.minutes, "quick": trial.accuracy}
+    return {"ready": True, "devices": devices, "expected": expected}
 
 
 def run_document(request: RunRequest, ended: events.Ended, state: RunState) -> dict[str, Any]:
@@ -96,17 +97,17 @@ def run_document(request: RunRequest, ended: events.Ended, state: RunState) -> d
     return {
         "exit_code": ended.exit_code,
         "line": ended.line,
-        "verdict": judged and judged.verdict.value,
-        "verification": judged and judged.verification and judged.verification.model_dump(mode="json"),
-        "check": judged and judged.check and judged.check.model_dump(mode="json"),
-        "quick": found and found.quick and found.quick.model_dump(mode="json"),
-        "length": judged and judged.length and judged.length.model_dump(mode="json"),
-        "measured_noise": noise and noise.noise.model_dump(mode="json"),
-        "displacement": moved and moved.model_dump(mode="json"),
+        "verdict": judged and judged.verdict,
+        "verification": judged and judged.verification,
+        "check": judged and judged.check,
+        "quick": found and found.quick,
+        "length": judged and judged.length,
+        "measured_noise": noise and noise.noise,
+        "displacement": moved,
         "teaching": moved and teaching_sentence(moved),
-        "run": str(request.folder.path),
-        "measurements": str(measurements) if measurements.is_file() else None,
-        "config": str(request.cell.config_path),
+        "run": request.folder.path,
+        "measurements": measurements if measurements.is_file() else None,
+        "config": request.cell.config_path,
     }
 
 
@@ -114,7 +115,7 @@ def replay_document(replayed: ReplayReport) -> dict[str, Any]:
     """What ``replay --json`` prints."""
     return {
         "same": replayed.is_same,
-        "journal": str(replayed.journal),
+        "journal": replayed.journal,
         "events": replayed.events,
         "decisions": replayed.decisions,
         "results": replayed.results,
@@ -122,7 +123,7 @@ def replay_document(replayed: ReplayReport) -> dict[str, Any]:
         "recorded_by": replayed.recorded_by,
         "replayed_by": replayed.replayed_by,
         "differences": [
-            {"line": one.line, "place": one.place, "aspect": one.aspect.value}
+            {"line": one.line, "place": one.place, "aspect": one.aspect}
             | {"counts": replayed.counts(one), **asdict(one.change)}
             for one in replayed.differences
         ],
@@ -135,9 +136,9 @@ def applied_document(applied: AppliedProposal) -> dict[str, Any]:
     return {
         "applied": bool(applied.by),
         "by": applied.by or None,
-        "config": str(change.path),
-        "further_configs": [str(path) for path in change.paths[1:]],
-        "run": str(applied.proposal.folder.path),
+        "config": change.path,
+        "further_configs": change.paths[1:],
+        "run": applied.proposal.folder.path,
         "sha256": change.sha256_after,
         "teach": teaching_sentence(moved) or None,
         "recorded": not applied.unrecorded,
@@ -148,37 +149,28 @@ def rollback_document(done: ConfigRollback) -> dict[str, Any]:
     """What ``rollback --json`` prints."""
     return {
         "restored": bool(done.change),
-        "config": str(done.paths[0]),
-        "further_configs": [str(path) for path in done.paths[1:]],
-        "from": str(done.restored[0]),
-        "undone": None if done.undone is None else str(done.undone),
+        "config": done.paths[0],
+        "further_configs": done.paths[1:],
+        "from": done.restored[0],
+        "undone": done.undone,
         "recorded": not done.unrecorded,
     }
 
 
 def config_history_document(found: ConfigHistory) -> dict[str, Any]:
     """What ``history --changes --json`` prints: the writes, the newest first."""
-    return {"changes": [_write_document(one) for one in found.writes], "damaged_lines": list(found.damaged)}
+    return {"changes": [_write_document(one) for one in found.writes], "damaged_lines": found.damaged}
 
 
 def _write_document(write: ConfigWrite) -> dict[str, Any]:
     one = write.record
+    known = one.model_dump(exclude={"version", "files", "why"})
     return {
-        "at": one.at.isoformat(),
-        "kind": one.kind.value,
-        "by": one.by,
-        "user": one.user or None,
-        "host": one.host or None,
-        "run": one.run or None,
-        "config": str(one.files[0]),
-        "further_configs": [str(path) for path in one.files[1:]],
-        "sha256_before": one.sha256_before or None,
-        "sha256_after": one.sha256_after or None,
-        "numbers_changed": one.numbers_changed,
-        "largest": None if one.largest is None else one.largest.model_dump(),
-        "verdict": None if write.verdict is None else write.verdict.value,
+        **{name: None if value == "" else value for name, value in known.items()},
+        "config": one.files[0],
+        "further_configs": one.files[1:],
+        "verdict": write.verdict,
         "why": write.why or None,
-        "reason": one.reason or None,
         "recorded": write.is_recorded,
     }
 
@@ -191,12 +183,12 @@ def history_document(runs: Sequence[PastRun]) -> dict[str, Any]:
 def _run_document(run: PastRun) -> dict[str, Any]:
     was, position = run.summary, run.summary.position
     return {
-        "run": str(run.folder.path),
-        "began": iso(was.began),
-        "ended": iso(was.ended),
+        "run": run.folder.path,
+        "began": was.began,
+        "ended": was.ended,
         "mode": was.mode or None,
         "records": was.records,
-        "verdict": was.verdict and was.verdict.value,
+        "verdict": was.verdict,
         "position_mm": position and position.value,
         "expanded_mm": position and position.expanded,
         "limit_mm": position and position.limit,
@@ -212,8 +204,8 @@ def _run_document(run: PastRun) -> dict[str, Any]:
 def comparison_document(before: PastRun, after: PastRun, compared: RunComparison) -> dict[str, Any]:
     """What ``history --compare --json`` prints."""
     return {
-        "before": str(before.folder.path),
-        "after": str(after.folder.path),
+        "before": before.folder.path,
+        "after": after.folder.path,
         "frame": compared.frame,
         "changed": compared.is_changed,
         "chi2": compared.test.chi2,
@@ -230,47 +222,34 @@ def drift_document(found: Sequence[ParameterTrend], watched: DriftHistory) -> di
     """What ``history --drift --json`` prints."""
     return {
         "parameters": [{**asdict(one), "walking": one.is_walking} for one in found],
-        "runs": [at.isoformat() for at in watched.runs],
-        "temperatures_c": list(watched.celsius),
+        "runs": watched.runs,
+        "temperatures_c": watched.celsius,
         "changes": [_change_document(one) for one in watched.changes],
         "shares_of_limit": dict(watched.shares),
     }
 
 
 def _change_document(found: FoundChange) -> dict[str, Any]:
-    return {
-        "leg": found.leg,
-        "possible_legs": list(found.possible_legs),
-        "after": found.after.isoformat(),
-        "before": found.before.isoformat(),
-        "noticed": found.noticed.isoformat(),
-        "parameter": found.parameter.name,
-        "unit": found.parameter.kind.unit.value,
-        "change": found.change,
-        "sigma": found.sigma,
-        "other_legs": list(found.other_legs),
-        "moved_again": found.moved_again,
-        "last_noticed": found.last_noticed.isoformat(),
-    }
+    parameter = {"parameter": found.parameter.name, "unit": found.parameter.kind.unit}
+    return asdict(found) | {"leg": found.leg, **parameter}
 
 
 def schedule_document(schedule: Schedule | None) -> dict[str, Any]:
     """What ``schedule --json`` prints."""
-    files, complaints = (schedule.files, schedule.complaints) if schedule else ((), ())
     return {
         "unit": schedule and schedule.unit,
-        "files": list(map(str, files)),
-        "complaints": list(complaints),
+        "files": schedule.files if schedule else [],
+        "complaints": schedule.complaints if schedule else [],
     }
 
 
 def retention_document(found: Retention, *, is_deleted: bool) -> dict[str, Any]:
     """What ``history --keep --json`` prints."""
     return {
-        "before": found.before.isoformat(),
+        "before": found.before,
         "deleted": is_deleted,
-        "runs": [str(run.folder.path) for run in found.leaving],
-        "kept": [{"run": str(run.folder.path), "reason": reason.value} for run, reason in found.kept],
+        "runs": [run.folder.path for run in found.leaving],
+        "kept": [{"run": run.folder.path, "reason": reason} for run, reason in found.kept],
     }
 
 
@@ -280,7 +259,7 @@ def story_document(entries: Sequence[Entry]) -> dict[str, Any]:
 
     return {
         "events": [
-            {"line": entry.number, "at": entry.at.isoformat(), "kind": entry.event.kind, "text": text}
+            {"line": entry.number, "at": entry.at, "kind": entry.event.kind, "text": text}
             for entry, text in run_story(entries)
         ]
     }

@@ -28,13 +28,7 @@ MOST_FRAMES = 12
 
 def search_document(found: SearchFindings) -> dict[str, Any]:
     """All that was found, and ``cell``: the text for a cell file."""
-    return {
-        "ports": [asdict(port) for port in found.ports],
-        "gauges": [asdict(one) for one in found.gauges],
-        "buses": [asdict(bus) for bus in found.buses],
-        "controller": None if found.controller is None else asdict(found.controller),
-        "cell": "\n".join(cell_lines(found)),
-    }
+    return asdict(found) | {"cell": "\n".join(cell_lines(found))}
 
 
 def search_lines(found: SearchFindings) -> Iterator[str]:

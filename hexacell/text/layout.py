@@ -33,11 +33,6 @@ def minute(at: datetime | None) -> str:
     return "-" if at is None else f"{at:%Y-%m-%d %H:%M}"
 
 
-def iso(at: datetime | None) -> str | None:
-    """A moment in a JSON document."""
-    return None if at is None else at.isoformat()
-
-
 def verdict_word(verdict: Verdict | None) -> str:
     """The verdict in a column of a table; a dash without one."""
     return "-" if verdict is None else verdict.value

@@ -76,10 +76,7 @@ def notifications_document(
     settings: Sequence[NotificationSettings], waiting: Sequence[PendingNotice]
 ) -> dict[str, Any]:
     """The JSON document of ``notify --json``, without addresses."""
-    return {
-        "notifications": [{"name": one.name, "on": list(one.on)} for one in settings],
-        "waiting": [one.model_dump(mode="json") for one in waiting],
-    }
+    return {"notifications": [{"name": one.name, "on": one.on} for one in settings], "waiting": waiting}
 
 
 def written_schedule_text(schedule: Schedule, run: ScheduledRun, stated: UnattendedSettings) -> str:

@@ -49,7 +49,7 @@ def test_one_line_before_the_result_says_what_must_be_taught_anew(request_of):
     assert where.endswith(str(request.folder.path))
     assert (teaching, line) == (teaching_line(moved), "all well")
     document = run_document(request, ended, RunState())
-    assert document["displacement"] == moved.model_dump()
+    assert document["displacement"] == moved
     assert document["teaching"] == teaching_sentence(moved)
     untouched = run_document(request, events.Ended(exit_code=0, line="all well"), RunState())
     assert untouched["displacement"] is untouched["teaching"] is untouched["measured_noise"] is None

@@ -63,7 +63,6 @@ docs: venv
 # The pictures of README and docs, and the table of what the last `make bench` measured; CONTRIBUTING.md says which
 # is made by what.
 figures: venv
-	$(RUN) docs.draw
 	HEXACELL_UPDATE_SNAPSHOTS=1 $(RUN) pytest -q tests/screen/test_snapshots.py
 	cp tests/screen/snapshots/measure-140x40-dark.svg docs/screen-measure.svg
 	cp tests/screen/snapshots/review-140x40-light.svg docs/screen-review.svg

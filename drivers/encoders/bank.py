@@ -6,7 +6,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import partial
-from typing import Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from drivers.encoders.node_monitor import invalid_sample
 from drivers.errors import BusError, WrongSetting
@@ -106,18 +106,20 @@ class BankSession(ABC):
 Session = TypeVar("Session", bound=BankSession)
 
 
-class ThreadedBank(ABC, Generic[Session]):
-    """A :class:`drivers.interfaces.EncoderBank` of sessions on a thread; ``trace`` gets all traffic."""
+class ThreadedBank(Generic[Session]):
+    """A :class:`drivers.interfaces.EncoderBank` of sessions on a thread; ``trace`` gets all traffic.
+
+    Attributes:
+        session: opens the bus, by settings, the event that interrupts every wait, and ``trace``.
+    """
+
+    session: ClassVar[type[Any]]
 
     def __init__(self, settings: EncoderSettings, trace: TraceRecorder | None = None) -> None:
         self._settings = settings
         self._trace = trace
         self._worker: WorkerThread | None = None
         self._session: Session | None = None
-
-    @abstractmethod
-    def _begin(self, closing: threading.Event) -> Session:
-        """Open the bus; ``closing`` interrupts every wait."""
 
     async def open(self) -> tuple[DeviceIdentity, ...]:
         """The identities, legs 1 to 6, of the connected encoders.
@@ -152,9 +154,10 @@ class ThreadedBank(ABC, Generic[Session]):
             await worker.finish(self._close)
 
     def _open(self, closing: threading.Event) -> tuple[DeviceIdentity, ...]:
-        self._session = self._begin(closing)
-        self._session.start()
-        return self._session.identities
+        session: Session = self.session(self._settings, closing, self._trace)
+        self._session = session
+        session.start()
+        return session.identities
 
     def _close(self) -> None:
         session, self._session = self._session, None

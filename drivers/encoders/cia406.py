@@ -27,32 +27,17 @@ from drivers.wire_trace import TraceRecorder
 from hexacell.cell.devices import EncoderSettings
 
 
-class Cia406Bank(ThreadedBank["EncoderSession"]):
-    """The encoder bank of a cell; implements :class:`drivers.interfaces.EncoderBank`.
-
-    ``settings.bus`` is passed unchanged to ``can.Bus``, so every interface of python-can works.
-    """
-
-    alarm_timing: ClassVar[AlarmTiming] = AlarmTiming()
-
-    def _begin(self, closing: threading.Event) -> EncoderSession:
-        return EncoderSession(self._settings, closing, self._trace, self.alarm_timing)
-
-
 class EncoderSession(BankSession):
     """Opens, identifies, configures and starts the nodes; then takes samples."""
 
+    alarm_timing: ClassVar[AlarmTiming] = AlarmTiming()
+
     def __init__(
-        self,
-        settings: EncoderSettings,
-        closing: threading.Event,
-        trace: TraceRecorder | None,
-        alarm_timing: AlarmTiming,
+        self, settings: EncoderSettings, closing: threading.Event, trace: TraceRecorder | None
     ) -> None:
         self._legs = tuple(Leg(number, node) for number, node in enumerate(settings.nodes, 1))
         super().__init__(settings, [leg.subject for leg in self._legs])
         self._data_sheet = None if settings.eds is None else read_data_sheet(Path(settings.eds))
-        self._alarm_timing = alarm_timing
         self.bus = EncoderBus(bus_settings(settings), closing, trace)
 
     def close(self) -> None:
@@ -94,7 +79,7 @@ class EncoderSession(BankSession):
 
         self._sampler = sampler
         self.bus.health_check = check_all
-        self._alarms = AlarmPoll(nodes, monitors, self._alarm_timing)
+        self._alarms = AlarmPoll(nodes, monitors, self.alarm_timing)
         for node in nodes:
             node.command(NmtCommand.START)
         sampler.sample()
@@ -109,3 +94,12 @@ class EncoderSession(BankSession):
         if node.read_optional(SYNC_COUNTER):  # this program sends a SYNC without a counter
             node.write(SYNC_COUNTER, 0)
         return identity
+
+
+class Cia406Bank(ThreadedBank[EncoderSession]):
+    """The encoder bank of a cell; implements :class:`drivers.interfaces.EncoderBank`.
+
+    ``settings.bus`` is passed unchanged to ``can.Bus``, so every interface of python-can works.
+    """
+
+    session = EncoderSession

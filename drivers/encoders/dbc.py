@@ -131,22 +131,6 @@ def _named(all_of_them: Any, name: str, kind: str, settings: DbcSettings) -> Any
     return known[name]
 
 
-class DbcBank(ThreadedBank["DbcSession"]):
-    """The encoder bank of a cell; implements :class:`drivers.interfaces.EncoderBank`."""
-
-    def __init__(self, settings: EncoderSettings, trace: TraceRecorder | None = None) -> None:
-        super().__init__(settings, trace)
-        if settings.dbc is None:
-            raise UsageError(
-                "the encoders' messages are not stated",
-                action="Add [encoders.dbc] with file and signals to the cell file",
-            )
-        self._described = settings.dbc
-
-    def _begin(self, closing: threading.Event) -> DbcSession:
-        return DbcSession(self._settings, self._described, closing, self._trace)
-
-
 @dataclass(frozen=True, slots=True)
 class _Received:
     """The latest position of a leg, in its unit; ``problem`` is why it cannot be trusted."""
@@ -160,12 +144,14 @@ class DbcSession(BankSession):
     """A bus on which the encoders are heard."""
 
     def __init__(
-        self,
-        settings: EncoderSettings,
-        described: DbcSettings,
-        closing: threading.Event,
-        trace: TraceRecorder | None = None,
+        self, settings: EncoderSettings, closing: threading.Event, trace: TraceRecorder | None
     ) -> None:
+        described = settings.dbc
+        if described is None:
+            raise UsageError(
+                "the encoders' messages are not stated",
+                action="Add [encoders.dbc] with file and signals to the cell file",
+            )
         self._described = described
         self._database = read_database(described, settings.unit, settings.step)
         super().__init__(settings, [signal.subject for signal in self._database.signals])
@@ -278,3 +264,9 @@ class DbcSession(BankSession):
             and min(times) >= since_s
             and max(times) - min(times) <= self._described.window_s
         )
+
+
+class DbcBank(ThreadedBank[DbcSession]):
+    """The encoder bank of a cell; implements :class:`drivers.interfaces.EncoderBank`."""
+
+    session = DbcSession

@@ -76,33 +76,19 @@ def counts_in(
     return found
 
 
-class ModbusBank(ThreadedBank["ModbusSession"]):
-    """The encoder bank of a cell; implements :class:`drivers.interfaces.EncoderBank`."""
-
-    def __init__(self, settings: EncoderSettings, trace: TraceRecorder | None = None) -> None:
-        super().__init__(settings, trace)
-        if settings.modbus is None:
-            raise UsageError(
-                "it is not stated in which registers the encoders are",
-                action="Add [encoders.modbus] with port and registers to the cell file",
-            )
-        self._described = settings.modbus
-
-    def _begin(self, closing: threading.Event) -> ModbusSession:
-        return ModbusSession(self._settings, self._described, closing, self._trace)
-
-
 class ModbusSession(BankSession):
     """A line on which the encoders answer."""
 
     def __init__(
-        self,
-        settings: EncoderSettings,
-        described: ModbusEncoderSettings,
-        closing: threading.Event,
-        trace: TraceRecorder | None = None,
+        self, settings: EncoderSettings, closing: threading.Event, trace: TraceRecorder | None
     ) -> None:
         super().__init__(settings, [f"encoder of leg {leg}" for leg in range(1, 7)])
+        described = settings.modbus
+        if described is None:
+            raise UsageError(
+                "it is not stated in which registers the encoders are",
+                action="Add [encoders.modbus] with port and registers to the cell file",
+            )
         self._described, self._closing = described, closing
         if described.port is None:
             raise BusError(
@@ -192,3 +178,9 @@ class ModbusSession(BankSession):
             subject=span.subject,
             action=f"Check its supply and cable, and devices and serial in [encoders.modbus], {void}",
         )
+
+
+class ModbusBank(ThreadedBank[ModbusSession]):
+    """The encoder bank of a cell; implements :class:`drivers.interfaces.EncoderBank`."""
+
+    session = ModbusSession

@@ -14,6 +14,7 @@ from hexacell.services.history.cell_status import (
     UnreadableCell,
     summary_of,
 )
+from hexacell.text.documents import summary_document
 from hexacell.text.history import legs_text
 from hexacell.text.layout import error_with_u, figure_with_u, minute, verdict_word
 from hexacell.verdict.decision import Verdict
@@ -178,21 +179,11 @@ def fleet_history_text(runs: Sequence[FleetRun]) -> str:
 
 def fleet_history_document(runs: Sequence[FleetRun]) -> dict[str, Any]:
     """What ``history --archive URL --json`` prints without a cell."""
-    return {"runs": [_fleet_run_document(one) for one in runs]}
-
-
-def _fleet_run_document(one: FleetRun) -> dict[str, Any]:
-    was, position = one.summary, one.summary.position
     return {
-        "cell": one.cell,
-        "host": one.host,
-        "run": one.name,
-        "mode": was.mode,
-        "began": was.began,
-        "ended": was.ended,
-        "verdict": was.verdict,
-        "position_mm": position and position.value,
-        "expanded_mm": position and position.expanded,
+        "runs": [
+            {"cell": one.cell, "host": one.host, "run": one.name, **summary_document(one.summary)}
+            for one in runs
+        ]
     }
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from hexacell.results.run_comparison import ParameterTrend, RunComparison
     from hexacell.services.history.drift_history import DriftHistory, FoundChange
     from hexacell.services.history.retention import Retention
-    from hexacell.services.history.run_index import PastRun
+    from hexacell.services.history.run_index import PastRun, RunSummary
     from hexacell.services.offline import NextPose, PlanTrial
     from hexacell.services.run.calibration_run import RunRequest
     from hexacell.services.schedule.schedules import Schedule
@@ -181,9 +181,13 @@ def history_document(runs: Sequence[PastRun]) -> dict[str, Any]:
 
 
 def _run_document(run: PastRun) -> dict[str, Any]:
-    was, position = run.summary, run.summary.position
+    return {"run": run.folder.path, "in_controller": run.is_in_controller, **summary_document(run.summary)}
+
+
+def summary_document(was: RunSummary) -> dict[str, Any]:
+    """What a run was and found."""
+    position = was.position
     return {
-        "run": run.folder.path,
         "began": was.began,
         "ended": was.ended,
         "mode": was.mode or None,
@@ -195,7 +199,6 @@ def _run_document(run: PastRun) -> dict[str, Any]:
         "line": was.line,
         "begun": was.has_begun,
         "over": was.is_over,
-        "in_controller": run.is_in_controller,
         "written": was.has_written,
         "proposal": was.has_proposal,
     }

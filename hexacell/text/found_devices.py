@@ -9,10 +9,9 @@ import tomlkit
 from drivers.discovery.encoders import BusFindings, FoundFrame, FoundNode
 from drivers.discovery.gauges import FoundGauge, PortFindings
 from drivers.serial.opening import SerialPortFound
-from hexacell.kinematics.parameters import JointUnit
+from hexacell.kinematics.parameters import LEGS, JointUnit
 from hexacell.services.devices.device_diagnosis import DeviceDiagnosis, Failure
 from hexacell.services.devices.device_search import (
-    LEGS,
     SearchFindings,
     encoder_keys,
     found_bank,
@@ -20,6 +19,7 @@ from hexacell.services.devices.device_search import (
     gauge_keys,
     unknown_encoders,
 )
+from hexacell.text.layout import counted
 from hexacell.text.planning import device_line
 
 AXES = "xyz"
@@ -186,21 +186,17 @@ def diagnosis_lines(found: DeviceDiagnosis) -> Iterator[str]:
     for identity in found.identities:
         yield device_line(identity)
     rate = found.readings / found.seconds if found.seconds else 0.0
-    yield f"{_counted(found.readings, 'reading')} in {found.seconds:.1f} s, {rate:.1f} a second"
+    yield f"{counted(found.readings, 'reading')} in {found.seconds:.1f} s, {rate:.1f} a second"
     for series in found.series:
         scatter = "" if series.scatter is None else f", scatter {_micro(series.scatter, series.unit)}"
         span = f"{series.lowest:.4f} to {series.highest:.4f} {series.unit}"
-        yield f"{series.name}: {span}, {_counted(series.distinct, 'distinct value')}{scatter}"
+        yield f"{series.name}: {span}, {counted(series.distinct, 'distinct value')}{scatter}"
     if not found.failures:
         yield "No answer was damaged or missing."
     for failure in found.failures:
         was = "was" if failure.count == 1 else "were"
-        yield f"{_counted(failure.count, 'answer')} {was} {failure.kind}, at last: {failure.latest}"
+        yield f"{counted(failure.count, 'answer')} {was} {failure.kind}, at last: {failure.latest}"
     yield from _meaning(found)
-
-
-def _counted(number: int, what: str) -> str:
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def _meaning(found: DeviceDiagnosis) -> Iterator[str]:

@@ -7,7 +7,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.lengths import shown, unit_of
 from hexacell.noise.record_noise import NoiseLevels, Repeatability
-from hexacell.text.layout import wrapped
+from hexacell.text.layout import counted, wrapped
 from hexacell.text.measured_noise import measured_noise_text
 from hexacell.text.parameters import parameter_rows, parameter_table
 from hexacell.uncertainty.budget import UncertaintyBudget
@@ -43,7 +43,7 @@ def identification_report(assessed: Assessment) -> str:
         "\n".join(
             [
                 *pairs,
-                *([f"and {_counted(more, 'more pair')} beyond 0.9 (--json lists them)"] if more else []),
+                *([f"and {counted(more, 'more pair')} beyond 0.9 (--json lists them)"] if more else []),
             ]
         ),
     )
@@ -138,14 +138,10 @@ def repeatability_lines(scatter: Repeatability | None) -> str:
         return "Repeatability: not evaluated, no pose was measured twice."
     x, y, z = scatter.per_axis_mm
     return wrapped(
-        f"Repeatability: on returning to {_counted(scatter.poses, 'pose')} the ball scatters by "
+        f"Repeatability: on returning to {counted(scatter.poses, 'pose')} the ball scatters by "
         f"x {x:.4f}, y {y:.4f}, z {z:.4f} mm "
-        f"({_counted(scatter.degrees_of_freedom, 'degree')} of freedom)."
+        f"({counted(scatter.degrees_of_freedom, 'degree')} of freedom)."
     )
-
-
-def _counted(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def budget_table(budget: UncertaintyBudget | None) -> str:

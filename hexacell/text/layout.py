@@ -28,6 +28,11 @@ def duration(minutes: float) -> str:
     return f"{60.0 * minutes:.0f} seconds" if minutes < 1.5 else f"{minutes:.0f} minutes"
 
 
+def counted(number: int, noun: str) -> str:
+    """A number of things: ``1 pose``, ``2 poses``."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
 def minute(at: datetime | None) -> str:
     """A moment to the minute in a column of a table; a dash without one."""
     return "-" if at is None else f"{at:%Y-%m-%d %H:%M}"

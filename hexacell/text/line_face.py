@@ -15,8 +15,8 @@ from hexacell.campaign.decisions import Forecast
 from hexacell.lengths import unit_of
 from hexacell.text.layout import COLUMNS, duration, wrapped
 from hexacell.text.measured_noise import measured_noise_text
-from hexacell.text.planning import quick_accuracy_text, quick_start_text, run_forecast_line
-from hexacell.text.verdict import check_start_text, check_text, length_text, verification_text
+from hexacell.text.planning import quick_accuracy_text, run_forecast_line
+from hexacell.text.verdict import check_text, length_text, start_text, verification_text
 from procedures.journal.journal import Entry
 from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import (
@@ -166,8 +166,8 @@ def event_text(event: events.Event, state: RunState) -> str | None:
     """What an event reports, if anything; ``state`` includes the event."""
     match event:
         case events.RunStarted(mode=mode, accepted=accepted):
-            start = quick_start_text if mode == "quick" else check_start_text
-            return None if mode == "optimise" else start(accepted)
+            what = "quick level" if mode == "quick" else "check"
+            return None if mode == "optimise" else start_text(what, accepted)
         case events.NoiseMeasured():
             noise = measured_noise_text(event.noise, with_averaging=True)
             pilots = len(state.set(event.at).pilots)

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 from drivers.interfaces import DeviceIdentity
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
@@ -11,7 +10,6 @@ from hexacell.dry_run.quick_level import QuickTrial
 from hexacell.dry_run.verdict_forecast import NOISE, WANTED, VerdictForecast
 from hexacell.lengths import shown, unit_of
 from hexacell.measurements.records import RecordId
-from hexacell.results.result import AcceptedResult
 from hexacell.services.offline import PlanTrial
 from hexacell.text.layout import duration, wrapped
 from hexacell.text.measured_noise import averaging_lines
@@ -184,13 +182,6 @@ def _rounded_up(limit: float) -> float:
 
 def _percent(share: float) -> str:
     return f"{share:.0%}" if share < 0.995 else f"{share:.1%}"
-
-
-def quick_start_text(accepted: AcceptedResult | None) -> str | None:
-    """The result that a quick level starts from."""
-    if accepted is None:
-        return None
-    return f"the quick level starts from the result of {accepted.at:%Y-%m-%d}, {Path(accepted.run).name}"
 
 
 def quick_accuracy_text(found: QuickAccuracy) -> str:

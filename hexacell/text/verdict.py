@@ -103,11 +103,11 @@ def alarm_sentence(alarm: ChangeAlarm) -> str:
     )
 
 
-def check_start_text(accepted: AcceptedResult | None) -> str:
-    """What a check starts from."""
+def start_text(what: str, accepted: AcceptedResult | None) -> str:
+    """What a check or a quick level, which ``what`` names, starts from."""
     if accepted is None:
-        return "no accepted result has the controller's config: the check starts from the drawing"
-    return f"the check starts from the result of {accepted.at:%Y-%m-%d}, {Path(accepted.run).name}"
+        return f"no accepted result has the controller's config: the {what} starts from the drawing"
+    return f"the {what} starts from the result of {accepted.at:%Y-%m-%d}, {Path(accepted.run).name}"
 
 
 def not_checked(scale_of: str = "encoders") -> str:

@@ -15,7 +15,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from math import isfinite
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, Self
 
 from hexacell.cell.fields import Frozen, SixNumbers
 from hexacell.cell.measuring import AcceptanceSettings
@@ -139,6 +139,15 @@ class GeometryErrors(Frozen):
     position: JudgedError
     orientation: JudgedError
 
+    @classmethod
+    def of(cls, errors: TaskErrors, limits: ErrorLimits) -> Self:
+        """The decision on errors under limits."""
+        factor = limits.guard_band_factor
+        return cls(
+            position=JudgedError.of(errors.position, limits.position_mm, factor),
+            orientation=JudgedError.of(errors.orientation, limits.orientation_deg, factor),
+        )
+
     @property
     def verdict(self) -> Verdict:
         """The decision on both."""
@@ -178,18 +187,13 @@ class VerifiedAccuracy(Frozen):
         length: LengthResult | None = None,
     ) -> VerifiedAccuracy:
         """The decision on errors at the poses of a ``task`` that the ``robot`` reaches."""
-        factor, joint_unit = limits.guard_band_factor, robot.mechanism.words.joint_unit
+        joint_unit, judged = robot.mechanism.words.joint_unit, GeometryErrors.of(errors, limits)
         return cls(
-            position=JudgedError.of(errors.position, limits.position_mm, factor),
-            orientation=JudgedError.of(errors.orientation, limits.orientation_deg, factor),
+            position=judged.position,
+            orientation=judged.orientation,
             poses=len(task.poses),
             task_named=task_named,
-            of_geometry=None
-            if of_geometry is None
-            else GeometryErrors(
-                position=JudgedError.of(of_geometry.position, limits.position_mm, factor),
-                orientation=JudgedError.of(of_geometry.orientation, limits.orientation_deg, factor),
-            ),
+            of_geometry=None if of_geometry is None else GeometryErrors.of(of_geometry, limits),
             worst=robot.to_command(task.poses.pose(errors.worst)).as_tuple(),
             length=length,
             scale_of="encoders" if joint_unit is JointUnit.MM else "drawing",

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from docs import draw, generated
+from docs import generated
+from hexacell.cell.devices import GaugeAxis
 from hexacell.cell.loader import schema
 from hexacell.cli.parser import make_parser
 
@@ -43,5 +44,8 @@ def test_each_page_gets_its_part():
         assert len(generated.page_with_generated_parts(text)) > len(text) + 8000
 
 
-def test_the_drawing_is_the_one_that_is_made():
-    assert draw.picture() == (DOCS / "gauges.svg").read_text(encoding="utf-8")
+def test_the_drawing_has_the_signs_of_gauges():
+    picture = (DOCS / "gauges.svg").read_text(encoding="utf-8")
+    for side, word in ((1, "pushed in"), (-1, "let out")):
+        shown = f"is {word}, shows {GaugeAxis(0, side).reading(1.0):+.3f}:"
+        assert shown in picture

@@ -14,12 +14,12 @@ from dataclasses import dataclass
 
 from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import UsageError
+from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import Pose
 
 MAX_LINE_BYTES = 255
 """Longest command with its line end; a longer one overruns the buffer of LinuxCNC 2.9."""
 
-_LEGS = 6
 _EXPLANATION = "error:"
 _RESPONSE_NAME = {"SET_WAIT": "WAIT_MODE"}
 _DECIMALS = 8
@@ -174,7 +174,7 @@ def parse_positions(text: str) -> tuple[float, float, float, float, float, float
         ValueError: There are fewer than six, or one of them is no finite number.
     """
     try:
-        x, y, z, a, b, c = (float(word) + 0.0 for word in text.split()[:_LEGS])  # -0.0 becomes 0.0
+        x, y, z, a, b, c = (float(word) + 0.0 for word in text.split()[:LEGS])  # -0.0 becomes 0.0
     except ValueError as error:
         raise ValueError(f"it reports {text!r} where six positions belong") from error
     if not all(math.isfinite(value) for value in (x, y, z, a, b, c)):

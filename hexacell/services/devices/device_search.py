@@ -20,11 +20,9 @@ from drivers.discovery.encoders import (
 )
 from drivers.discovery.gauges import FoundGauge, PortFindings, probe_of, search_port
 from drivers.serial.opening import SerialPortFound, serial_ports
-from hexacell.kinematics.parameters import JointUnit
+from hexacell.kinematics.parameters import LEGS, JointUnit
 from hexacell.plugins import Group, load, names
 from hexacell.services.devices.first_cell import GAUGE_AXES, CellDraft, Document, FoundKeys
-
-LEGS = 6
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,11 @@
 """The notice of a run that nobody watched: of its end, or of the failure that ended it."""
 
 import socket
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from hashlib import sha256
-from typing import Literal
+from typing import Any, Literal
 
 from hexacell.cell.fields import Frozen, Name, Text
 from hexacell.cell.loader import Cell
@@ -87,22 +88,16 @@ class RunEnd:
 
 def notice_of_end(end: RunEnd) -> Notice:
     """The notice of a run with a verdict, or with a question that nobody answered."""
-    cell, state = end.request.cell, end.state
-    judged = state.judged
-    accuracy = judged_accuracy(judged)
-    alarm = raised_alarm(state)
-    occasions = _occasions(end)
-    name = end.request.folder.path.name
-    return Notice(
-        id=notice_id(cell.settings.name, name, *occasions),
-        cell=cell.settings.name,
-        host=socket.gethostname(),
+    cell, judged, name = end.request.cell, end.state.judged, end.request.folder.path.name
+    accuracy, alarm, occasions = judged_accuracy(judged), raised_alarm(end.state), _occasions(end)
+    return _notice(
+        cell,
+        occasions,
+        end.ended.line,
+        (name, *occasions),
         run=name,
         mode=end.request.mode.value,
-        at=datetime.now(UTC),
-        occasions=occasions,
         exit_code=end.ended.exit_code,
-        line=f"{cell.settings.name}: {end.ended.line}",
         verdict=None if judged is None else judged.verdict,
         position_mm=None if accuracy is None else accuracy.position.value,
         expanded_mm=None if accuracy is None else accuracy.position.expanded,
@@ -118,35 +113,41 @@ def notice_of_failure(request: RunRequest, error: Exception) -> Notice:
         text, code = " ".join(str(error).split()), error.exit_code
     else:  # the text of a fault is for its report alone
         text, code = f"a fault of the program: {type(error).__name__}", ExitCode.FAULT
-    name, cell = request.folder.path.name, request.cell.settings.name
     occasion = Occasion.ANSWER_NEEDED if isinstance(error, AnswerNeeded) else Occasion.FAILURE
-    at = datetime.now(UTC)
-    return Notice(
-        id=notice_id(cell, occasion, text, at.date().isoformat()),  # tried again, it is the same failure
-        cell=cell,
-        host=socket.gethostname(),
-        run=name if request.folder.journal.is_file() else None,
+    return _notice(
+        request.cell,
+        (occasion,),
+        text,
+        (occasion, text, datetime.now(UTC).date().isoformat()),  # tried again, it is the same failure
+        run=request.folder.path.name if request.folder.journal.is_file() else None,
         mode=request.mode.value,
-        at=at,
-        occasions=(occasion,),
         exit_code=int(code),
-        line=f"{cell}: {text}",
     )
 
 
 def notice_of_test(cell: Cell) -> Notice:
     """The notice that shows whether everybody can be notified."""
-    name, at = cell.settings.name, datetime.now(UTC)
+    own = (Occasion.TEST, datetime.now(UTC).isoformat())
+    return _notice(cell, (Occasion.TEST,), TEST_LINE, own, run=None, mode=Occasion.TEST, exit_code=0)
+
+
+def _notice(
+    cell: Cell,
+    occasions: tuple[Occasion, ...],
+    line: str,
+    own: Iterable[str],
+    **further: Any,  # noqa: ANN401 - fields of the notice
+) -> Notice:
+    """A notice from this computer at this moment; ``own`` are the words that its id follows from."""
+    name = cell.settings.name
     return Notice(
-        id=notice_id(name, Occasion.TEST, at.isoformat()),
+        id=notice_id(name, *own),
         cell=name,
         host=socket.gethostname(),
-        run=None,
-        mode=Occasion.TEST,
-        at=at,
-        occasions=(Occasion.TEST,),
-        exit_code=0,
-        line=f"{name}: {TEST_LINE}",
+        at=datetime.now(UTC),
+        occasions=occasions,
+        line=f"{name}: {line}",
+        **further,
     )
 
 

@@ -16,7 +16,7 @@ import pytest
 
 from drivers.conformance import served_encoder_twin
 from drivers.encoders.bank import ThreadedBank
-from drivers.encoders.cia406 import Cia406Bank
+from drivers.encoders.cia406 import Cia406Bank, EncoderSession
 from drivers.encoders.dbc import DbcBank
 from drivers.encoders.modbus import ModbusBank
 from drivers.encoders.node_monitor import AlarmTiming
@@ -201,7 +201,7 @@ def lines(found: list[Row]) -> list[str]:
 
 @pytest.fixture(autouse=True)
 def alarms_are_read_with_every_sample(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Cia406Bank, "alarm_timing", AlarmTiming(0.0, math.inf, 1))
+    monkeypatch.setattr(EncoderSession, "alarm_timing", AlarmTiming(0.0, math.inf, 1))
 
 
 @pytest.mark.slow

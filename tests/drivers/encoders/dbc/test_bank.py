@@ -136,7 +136,7 @@ async def test_without_bus_or_description_the_cell_file_is_told(settings):
     with pytest.raises(BusError, match="not configured"):
         await DbcBank(settings()).open()
     with pytest.raises(UsageError, match="messages are not stated"):
-        DbcBank(LinearEncoderSettings(protocol="dbc"))
+        await DbcBank(LinearEncoderSettings(protocol="dbc")).open()
 
 
 async def test_without_the_extra_the_command_that_installs_it_is_told(settings, wire, monkeypatch):

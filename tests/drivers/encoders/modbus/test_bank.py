@@ -203,7 +203,7 @@ async def test_what_the_cell_file_lacks_is_told():
     with pytest.raises(BusError, match="encoders: port /dev/nowhere is absent"):
         await ModbusBank(modbus_settings(port="/dev/nowhere")).open()
     with pytest.raises(UsageError, match="in which registers the encoders are"):
-        ModbusBank(LinearEncoderSettings(protocol="modbus"))
+        await ModbusBank(LinearEncoderSettings(protocol="modbus")).open()
 
 
 async def test_without_the_extra_the_command_that_installs_it_is_told(simulated, monkeypatch):

@@ -7,7 +7,7 @@ import numpy as np
 
 from hexacell.errors import IdentifiabilityError
 from hexacell.identification.data_faults import messages
-from hexacell.identification.data_faults.hypotheses import OutlierStatistics
+from hexacell.identification.data_faults.outlier_statistics import OutlierStatistics
 from hexacell.identification.data_faults.stepwise_selection import (
     LARGEST_REJECTED_SHARE,
     Selection,

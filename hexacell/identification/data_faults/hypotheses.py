@@ -17,39 +17,29 @@ with M of :class:`.LinearizedModel`, of which only the blocks of the records con
 - a known change of the readings, with no unknown: a gauge fault. Readings d should have been T d, so that
   the residuals change by ``z = -(T - 1) d`` and the chi-square by ``2 z^T M r + z^T M z``.
 
-A record that was left out is compared with what the fit predicts of it (:func:`deletion_tests`). If it
-disagrees, the simplest cause is looked for: a leg whose joint variable is off, a gauge fault, one wrong
-gauge, or several.
-
-Sources: Rao, Proc. Cambridge Phil. Soc. 44, 1948 (score test); Baarda, A testing procedure for use in
-geodetic networks, 1968 (data snooping); Cook and Weisberg, Residuals and Influence in Regression, 1982.
+Source: Rao, Proc. Cambridge Phil. Soc. 44, 1948 (score test).
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import chain, zip_longest
 
 import numpy as np
 
-from hexacell.distributions import chi_square_limit, normal_limit
-from hexacell.identification.problem.commanded_poses import ACCEPTED_MM
+from hexacell.distributions import chi_square_limit
+from hexacell.identification.data_faults.outlier_statistics import OutlierStatistics, model_at, row_of
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.linear_model import LinearizedModel
-from hexacell.identification.solver.measurement_model import predict
 from hexacell.identification.solver.result import GAUGES, DataFaultKind, Identification
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.measurements.records import Deviation, RecordId, deviation_of
+from hexacell.measurements.records import RecordId
 
 PENALTY_PER_UNKNOWN = 10.0
 """How much a hypothesis must lower the chi-square for each number that it is free to choose."""
-
-FALSE_ALARMS_PER_RECORD = 2e-4
-FALSE_ALARMS_PER_FILE = 0.02
-"""The smaller rate applies: a file of 100,000 good records must not lose any either."""
 
 WORTH_TESTING = 0.05
 """Probability of the residuals below which zero shifts and gauge faults are tested too."""
@@ -62,32 +52,10 @@ SMALLEST_GAUGE_FAULT_GAIN = 25.0
 LONGEST_LIST = 3
 """Hypotheses around the drawing, and around a solution that is not trusted, that are worth a refit."""
 
-SMALLEST_REDUNDANCY = 1e-3
-"""Share of a record's information that the others must determine, or its residual is no evidence."""
-
-MEDIAN_OF_CHI2_3 = 2.366
-SCATTER_OF_MEDIAN = 1.12
-"""Relative standard deviation of the median of n such values, times the square root of n."""
-
-SMALLEST_GAUGE_FAULT_MM = 1.0
-"""A smaller gross error resembles some gauge fault by chance."""
-
-CAUSE_PROBABILITY = 1e-3
-"""Probability that chance alone speaks against the right cause of a gross error."""
-
-MIN_COMPARED_RECORDS = 3
-OUTLIER_SCATTERS = 10.0
-"""Median absolute deviations beyond which a joint variable is an outlier."""
-
 MM_PER_INCH = 25.4
 
 SPLIT_POINT = -1
 """Label of the point that the records after a zero shift form while it is tested."""
-
-
-def row_of(problem: Problem, record: RecordId) -> int:
-    """The row of a record."""
-    return int(np.flatnonzero((problem.labels == record).all(axis=1))[0])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -206,32 +174,6 @@ class GaugeFaultHypothesis(FaultHypothesis):
 ALL_IN_INCHES = GaugeFaultHypothesis(gain=0.0, unknowns=0, gauge_fault=GAUGE_FAULTS[-1], point=None)
 
 
-def _model_at(
-    problem: Problem, free: Array, active_prior: Array, among: Collection[RecordId] | None = None
-) -> LinearizedModel | None:
-    """The linear model around a geometry of the records that have poses there, clear of singularities.
-
-    Args:
-        problem: the records.
-        free: parameters (p,) of the geometry, mm.
-        active_prior: precision (p, p), 1/mm^2, of the prior where it was not released.
-        among: the records that count; None: all.
-
-    Returns:
-        The model; None if no record is left.
-    """
-    started = problem.started_at(free)
-    usable = started.has_start_pose if among is None else started.has_start_pose & problem.mask_of(among)
-    some = started.subset(usable)
-    prediction = predict(some, some.initial_parameters, some.start)
-    if prediction.singular.all():
-        return None
-    if prediction.singular.any():
-        some = some.subset(~prediction.singular)
-        prediction = predict(some, some.initial_parameters, some.start)
-    return LinearizedModel.around(some, prediction, active_prior)
-
-
 def rank_hypotheses(
     problem: Problem, fit: Identification, *, found_before: int = 0, is_trusted: bool = True
 ) -> list[FaultHypothesis]:
@@ -247,10 +189,10 @@ def rank_hypotheses(
     model, goodness = fit.linear_model, fit.noise_test
     around_drawing: list[GaugeFaultHypothesis] = []
     if not is_trusted:
-        drawing = _model_at(problem, problem.initial_parameters, problem.prior.precision)
+        drawing = model_at(problem, problem.initial_parameters, problem.prior.precision)
         around_drawing = _rank_gauge_faults(drawing) if drawing else []
         # With the records that the solver left out, as far as they have poses at the solution.
-        model = _model_at(problem, fit.free, fit.active_prior) or model
+        model = model_at(problem, fit.free, fit.active_prior) or model
         goodness = ChiSquareTest(model.chi2, model.problem.coordinates)
     statistics = OutlierStatistics.of(model)
     likely: list[FaultHypothesis] = [*_outlier(model, statistics, found_before)]
@@ -354,160 +296,3 @@ def _sums_from(problem: Problem, values: Array) -> Array:
     before = np.cumsum(values, axis=0) - values
     in_point = before - problem.per_record(before[problem.first_rows])
     return np.asarray(problem.per_record(problem.group_sums(values)) - in_point)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class OutlierStatistics:
-    """Tests of n records for gross errors.
-
-    Attributes:
-        along_gauges: (n, 3) squared standardised shift along each gauge; about 1 for a good record.
-        omnibus: (n,) squared standardised shift; about 3 for a good record.
-        scale: noise variance, by the median record, over the stated one where it is significantly larger,
-            else 1.
-    """
-
-    along_gauges: Array
-    omnibus: Array
-    scale: float
-
-    @classmethod
-    def of(cls, model: LinearizedModel) -> OutlierStatistics:
-        """The tests of all records of a model."""
-        weights, gauges = model.weights, model.problem.gauges
-        covariance = model.residual_covariance
-        information = np.einsum("ia,nij,ja->na", gauges, weights @ covariance @ weights, gauges)
-        whole = np.einsum("ia,nij,ja->na", gauges, weights, gauges)
-        along_gauges = _squares_over(model.scores @ gauges, information, SMALLEST_REDUNDANCY * whole)
-        values, axes = np.linalg.eigh(covariance)
-        along = np.einsum("nij,ni->nj", axes, model.residuals)
-        smallest = SMALLEST_REDUNDANCY / np.linalg.eigvalsh(weights)[:, -1:]
-        omnibus = np.sum(_squares_over(along, values, smallest), axis=-1)
-        noise = float(np.median(omnibus)) / MEDIAN_OF_CHI2_3
-        is_larger = noise > 1.0 + 4.0 * SCATTER_OF_MEDIAN / np.sqrt(len(omnibus))
-        return cls(along_gauges, omnibus, noise if is_larger else 1.0)
-
-    def threshold_ratio(self, found_before: int = 0) -> Array:
-        """The larger statistic (n,) of each record over its critical value.
-
-        The false alarm rate grows with the errors found before, so that the share of false alarms
-        among all alarms stays constant (Benjamini and Hochberg 1995).
-        """
-        records = len(self.omnibus)
-        rate = min(FALSE_ALARMS_PER_RECORD, FALSE_ALARMS_PER_FILE / records) * (found_before + 1) / 2.0
-        along_a_gauge = self.along_gauges.max(axis=-1) / normal_limit(rate / 6.0) ** 2
-        in_space = self.omnibus / chi_square_limit(3, rate)
-        return np.asarray(np.maximum(along_a_gauge, in_space) / self.scale)
-
-
-def _squares_over(values: Array, variances: Array, smallest: Array) -> Array:
-    """Squares over variances; zero where these are too small for a test."""
-    testable = variances > smallest
-    return np.asarray(np.where(testable, values**2 / np.where(testable, variances, 1.0), 0.0))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class DeletionTest:
-    """The test of a record against a fit without it, and what is wrong with it if it disagrees.
-
-    Attributes:
-        gauges: the faulty gauges, of ``xyz``; empty if no single one is at fault.
-        offset_mm: the errors of the gauges x, y and z; None next to a singularity.
-        leg: a leg (from 1) whose joint variable is an outlier, and its distance from the commanded
-            position, mm.
-        statistics: the tests of the fit's records and this one; None next to a singularity.
-    """
-
-    record: RecordId
-    kind: DataFaultKind
-    leg: tuple[int, float] | None
-    gauges: str = ""
-    offset_mm: Deviation | None = None
-    statistics: OutlierStatistics | None = None
-    row: int = 0
-
-    @property
-    def significance(self) -> float:
-        """The larger statistic of the record over its critical value; infinite where it is certain."""
-        if self.statistics is None or self.is_certain:
-            return float("inf")
-        return float(self.statistics.threshold_ratio()[self.row])
-
-    @property
-    def is_certain(self) -> bool:
-        """Whether the record is false whatever the fit says, as joint variables of another command are."""
-        return self.statistics is None or self.kind is DataFaultKind.MISMATCHED_JOINTS
-
-    def agrees(self, found_before: int = 0) -> bool:
-        """Whether chance explains the difference, after some records that certainly disagree."""
-        if self.statistics is None:
-            return False
-        return bool(self.statistics.threshold_ratio(found_before)[self.row] <= 1.0)
-
-
-def deletion_tests(
-    problem: Problem, fit: Identification, without: Collection[RecordId]
-) -> dict[RecordId, DeletionTest]:
-    """Test each record of a problem that a fit does without, but for some others."""
-    used = fit.problem.record_ids
-    left_out = [record for record in problem.record_ids if record not in {*used, *without}]
-    return {
-        record: _deletion_test(
-            problem, record, _model_at(problem, fit.free, fit.active_prior, among={*used, record})
-        )
-        for record in left_out
-    }
-
-
-def _deletion_test(problem: Problem, record: RecordId, model: LinearizedModel | None) -> DeletionTest:
-    """The test of one record, by the model of the fit's records and this one around the fit."""
-    leg = _inconsistent_leg(problem, record)
-    if model is None or record not in model.problem.record_ids:
-        return DeletionTest(record, DataFaultKind.MISMATCHED_JOINTS if leg else DataFaultKind.SINGULAR, leg)
-    row = row_of(model.problem, record)
-    statistics = OutlierStatistics.of(model)
-    weights, gauges = model.weights[row], model.problem.gauges
-    information = gauges.T @ weights @ model.residual_covariance[row] @ weights @ gauges
-    offset = -np.linalg.pinv(information, hermitian=True) @ (gauges.T @ model.scores[row])
-    readings = model.problem.deviations[row] @ gauges
-    kind, faulty = _simplest_cause(offset, readings, information / statistics.scale)
-    if leg and not faulty:
-        kind = DataFaultKind.MISMATCHED_JOINTS
-    return DeletionTest(record, kind, leg, faulty, deviation_of(offset), statistics, row)
-
-
-def _inconsistent_leg(problem: Problem, record: RecordId) -> tuple[int, float] | None:
-    """The leg (from 1) whose joint variable in one record is an outlier, and its offset, mm; or None.
-
-    The test compares the differences between measured and commanded joint variables with their median
-    over the other records of the point. They change little between the poses of a point, whatever
-    geometry the controller had.
-    """
-    row = row_of(problem, record)
-    misfit = problem.joints - problem.commands.joints
-    is_other = (problem.labels[:, 0] == record[0]) & (np.arange(problem.records) != row)
-    known = misfit[is_other & np.isfinite(misfit).all(axis=-1)]
-    if len(known) < MIN_COMPARED_RECORDS or not np.isfinite(misfit[row]).all():
-        return None
-    usual = np.median(known, axis=0)
-    scatter = np.median(np.abs(known - usual), axis=0)
-    off = misfit[row] - usual
-    beyond = np.abs(off) - ACCEPTED_MM - OUTLIER_SCATTERS * scatter
-    leg = int(np.argmax(beyond))
-    return (leg + 1, float(off[leg])) if beyond[leg] > 0.0 else None
-
-
-def _simplest_cause(offset: Array, readings: Array, information: Array) -> tuple[DataFaultKind, str]:
-    """A gauge fault if one explains the offset, else one wrong gauge, else a wrong record."""
-    if np.abs(offset).max() > SMALLEST_GAUGE_FAULT_MM:
-        unexplained = [offset + fault.remedy @ readings - readings for fault in GAUGE_FAULTS]
-        squares = [float(rest @ information @ rest) for rest in unexplained]
-        best = int(np.argmin(squares))
-        if squares[best] < chi_square_limit(3, CAUSE_PROBABILITY):
-            return GAUGE_FAULTS[best].kind, GAUGE_FAULTS[best].gauges
-    along = (information @ offset) ** 2 / np.maximum(np.diag(information), 1e-300)
-    worst = int(np.argmax(along))
-    others = float(offset @ information @ offset - along[worst])
-    return DataFaultKind.GROSS_ERROR, GAUGES[worst] if others < chi_square_limit(
-        2, CAUSE_PROBABILITY
-    ) else ""

@@ -2,17 +2,14 @@
 
 import numpy as np
 
+from hexacell.identification.data_faults.corrected_fit import CorrectedFit
+from hexacell.identification.data_faults.deletion_tests import DeletionTest
 from hexacell.identification.data_faults.hypotheses import (
     MM_PER_INCH,
-    DeletionTest,
     GaugeFaultHypothesis,
     ZeroShiftHypothesis,
 )
-from hexacell.identification.data_faults.stepwise_selection import (
-    CorrectedFit,
-    Selection,
-    UncorrectableFaultError,
-)
+from hexacell.identification.data_faults.stepwise_selection import Selection, UncorrectableFaultError
 from hexacell.identification.solver.result import GAUGES, DataFault, DataFaultKind
 from hexacell.measurements.records import Deviation, RecordId
 

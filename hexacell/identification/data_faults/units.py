@@ -9,8 +9,8 @@ among others: they differ from millimetres by so little that fits have to be com
 
 import numpy as np
 
+from hexacell.identification.data_faults.corrected_fit import CorrectedFit
 from hexacell.identification.data_faults.hypotheses import GaugeFault, GaugeFaultHypothesis
-from hexacell.identification.data_faults.stepwise_selection import CorrectedFit
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.result import GAUGES, DataFault, DataFaultKind
 from hexacell.kinematics.rotations import Mask

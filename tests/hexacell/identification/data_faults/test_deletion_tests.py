@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from hexacell.identification.data_faults import stepwise_selection as proof
+from hexacell.identification.data_faults.corrected_fit import LARGEST_TRUSTED_RATIO, CorrectedFit
 from hexacell.identification.data_faults.hypotheses import ALL_IN_INCHES
 from hexacell.identification.data_faults.stepwise_selection import (
-    LARGEST_TRUSTED_RATIO,
-    CorrectedFit,
     confirmed_by_refit,
     refitted,
     required_significance,

@@ -20,9 +20,10 @@ from hexacell.kinematics.sensitivity import POSITION, free_sensitivity, sensitiv
 from hexacell.limits.limits import Limits
 
 SAFETY_SIGMAS = 4.0
-STOP_SIGMAS = 2.5
-"""Standard deviations of where the joints stop for which travel is kept. Where the ball leaves it all the
-same, another pose is taken: it stops elsewhere each time, so that this is no lasting loss."""
+CHANCE_SIGMAS = 2.5
+"""Standard deviations of what a stop shows by chance for which travel is kept. Where the ball leaves it
+all the same, another pose is taken: it stops elsewhere each time, so that this is no lasting loss. Where
+it stood when the gauges were zeroed is known better with each record."""
 TRAVEL_SHARE = 0.9
 """Share of the travel that the predicted deviation and four sigma may use. The most informative poses are
 at this limit, thousands of 50,000 records; with three sigma one in some thousands left the travel."""
@@ -110,8 +111,8 @@ class PredictedRecords(Batch):
         covariance: of the deviations (n, 3, 3), mm^2, the parameters being known.
         deviation: expected deviations (n, 3), mm.
         sigma: standard deviations (n, 3), mm, of what the gauges x, y, z will show, as the parameters are
-            known now, if the joints stop where they are commanded.
-        stops: (n, 3), mm, by where the joints stop.
+            known now, if the robot repeats and readings are exact.
+        chance: (n, 3), mm, by where the joints stop and by noise, here and when the gauges were zeroed.
     """
 
     targets: ReachableTargets
@@ -119,12 +120,12 @@ class PredictedRecords(Batch):
     covariance: Array
     deviation: Array
     sigma: Array
-    stops: Array
+    chance: Array
 
     @property
     def shown_sigma(self) -> Array:
         """Standard deviations (n, 3), mm, of what the gauges will show."""
-        return np.hypot(self.sigma, self.stops)
+        return np.hypot(self.sigma, self.chance)
 
     def stay_inside(self, limits: Limits) -> Mask:
         """Which deviations surely stay inside the gauges' room, by linear propagation."""
@@ -133,10 +134,10 @@ class PredictedRecords(Batch):
     def within(self, limits: Limits, share: float) -> Mask:
         """Which deviations stay within a share of the gauges' room, with four sigma.
 
-        Wherever the joints stop they are surely inside as well.
+        As far as chance goes they are almost surely inside as well.
         """
         spread = SAFETY_SIGMAS * self.sigma
-        stopped = np.hypot(spread, STOP_SIGMAS * self.stops)
+        stopped = np.hypot(spread, CHANCE_SIGMAS * self.chance)
         is_within = limits.within_travel(self.deviation, spread, share)
         return is_within & limits.within_travel(self.deviation, stopped, TRAVEL_SHARE)
 
@@ -165,8 +166,9 @@ def _predicted(
     """The records by the derivatives of the ball's position, see :func:`position_derivatives`."""
     jacobian = by_parameters - zero.jacobian
     covariance = belief.noise.record_covariance(by_joints) + zero.covariance
-    total = innovation_covariance(belief.covariance, jacobian, covariance)
-    sigma = belief.limits.sigma_along_gauges(total)
-    stops = belief.limits.sigma_along_gauges(belief.noise.stop_covariance(by_joints))
+    as_known = innovation_covariance(belief.covariance, jacobian, np.zeros((3, 3)))
+    sigma = belief.limits.sigma_along_gauges(as_known)
+    by_chance = belief.noise.chance_covariance(by_joints) + zero.covariance
+    chance = belief.limits.sigma_along_gauges(by_chance)
     deviation = targets.poses.positions - zero.reference
-    return PredictedRecords(targets, jacobian, covariance, deviation, sigma, stops)
+    return PredictedRecords(targets, jacobian, covariance, deviation, sigma, chance)

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from hexacell.design.candidates import ReachableTargets
 from hexacell.design.predicted_records import (
-    STOP_SIGMAS,
+    CHANCE_SIGMAS,
     TRAVEL_SHARE,
     GaugeZero,
     PredictedRecords,
@@ -120,7 +120,7 @@ class TravelConstraint:
         # The reference is estimated from its records, so that it closes the legs only approximately.
         poses = forward_kinematics(belief.mechanism, belief.estimate, joints, poses).poses
         sensitivity = free_sensitivity(belief.mechanism, belief.estimate, poses, joints)
-        scenario = _Scenario(belief, joints, poses, sensitivity)
+        scenario = _Scenario(belief, zero, joints, poses, sensitivity)
         sigma = belief.orientation_sigma_from(sensitivity)
         if sigma > UNCERTAIN_SIGMA:
             return scenario.nearly_all_hold()
@@ -129,7 +129,7 @@ class TravelConstraint:
         if len(robots) < FEWEST_SAMPLES:
             return np.zeros(len(targets), dtype=bool)
         share = 1.0 / (1.0 + sigma / HALF_TRAVEL_SIGMA)
-        holds = _all_within(robots, belief.limits, scenario.stop_spread(every), share)
+        holds = _all_within(robots, belief.limits, scenario.chance_spread(every), share)
         holds[holds] = self._margins_suffice(targets[holds])
         return holds
 
@@ -177,14 +177,15 @@ class _Scenario:
     """The reference, first, and n targets of the estimated robot, for robots sampled from the belief."""
 
     belief: RobotBelief
+    zero: GaugeZero
     joints: Array
     poses: PoseBatch
     sensitivity: FreeSensitivity
 
-    def stop_spread(self, targets: NDArray[np.intp]) -> Array:
-        """How far the ball may stop beside some of the targets (n, 3), mm, along the gauges."""
-        covariance = self.belief.noise.stop_covariance(self.sensitivity.joints[1 + targets, :3])
-        return STOP_SIGMAS * self.belief.limits.sigma_along_gauges(covariance)
+    def chance_spread(self, targets: NDArray[np.intp]) -> Array:
+        """How far the gauges may be off by chance (n, 3), mm, at some of the targets."""
+        covariance = self.belief.noise.chance_covariance(self.sensitivity.joints[1 + targets, :3])
+        return CHANCE_SIGMAS * self.belief.limits.sigma_along_gauges(covariance + self.zero.covariance)
 
     def nearly_all_hold(self) -> Mask:
         """At which targets (n,) the constraint holds on all of many sampled robots but the worst.
@@ -199,7 +200,7 @@ class _Scenario:
                 break
             more = self.sampled(variates, possible)
             robots = more if robots is None else _SampledRobots.joined([robots, more])
-            spread = self.stop_spread(possible)
+            spread = self.chance_spread(possible)
             within = _nearly_all_within(robots, self.belief.limits, spread, UNCERTAIN_SHARE)
             possible, robots = possible[within], robots[:, within]
         holds = np.zeros(len(self.joints) - 1, dtype=bool)

@@ -9,7 +9,7 @@ import numpy as np
 
 from hexacell.design.candidates import ReachableTargets, reachable_targets
 from hexacell.design.criteria import innovation_covariance
-from hexacell.design.predicted_records import STOP_SIGMAS, TRAVEL_SHARE, position_derivatives
+from hexacell.design.predicted_records import CHANCE_SIGMAS, TRAVEL_SHARE, position_derivatives
 from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics import rotations
@@ -91,14 +91,13 @@ def _stays_inside(belief: RobotBelief, actual: ActualPoses) -> Mask:
     Only those at which the robot keeps its limits too.
     """
     jacobian, by_joints = position_derivatives(belief, ReachableTargets(actual.poses, actual.joints))
-    noise = 2.0 * belief.noise.gauge_covariance
-    covariance = innovation_covariance(belief.covariance, jacobian - jacobian[0], noise)
-    sigma = belief.limits.sigma_along_gauges(covariance)
-    each = belief.noise.stop_covariance(by_joints)
-    stops = belief.limits.sigma_along_gauges(each + each[0])
+    as_known = innovation_covariance(belief.covariance, jacobian - jacobian[0], np.zeros((3, 3)))
+    sigma = belief.limits.sigma_along_gauges(as_known)
+    each = belief.noise.chance_covariance(by_joints)
+    chance = belief.limits.sigma_along_gauges(each + each[0])
     deviation = actual.poses.positions - actual.poses.positions[0]
     spread = SAFETY_SIGMAS * sigma
-    stopped = np.hypot(spread, STOP_SIGMAS * stops)
+    stopped = np.hypot(spread, CHANCE_SIGMAS * chance)
     # They are chosen long before the gauges are placed there.
     inside = belief.limits.within_travel(deviation, spread, TRAVEL_SHARE, surely=True)
     inside &= belief.limits.within_travel(deviation, stopped, TRAVEL_SHARE)

@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from hexacell.cell.model import CellSettings
-from hexacell.design.predicted_records import SAFETY_SIGMAS, STOP_SIGMAS, TRAVEL_SHARE
+from hexacell.design.predicted_records import CHANCE_SIGMAS
 from hexacell.errors import LimitError
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import Pose
@@ -30,6 +30,9 @@ SIGMAS = 5.0
 
 SCATTER = 1.5
 """Noise of the encoders over what is stated from which the ball may leave the travel by chance."""
+
+CHANCE_SHARE = 0.6
+"""Share of the gauges' room that chance may take: in what is left no pose could be measured."""
 
 ROOM_KEPT = 0.5
 """Share of the gauges' room that a plunger has left on either side when the gauges are zeroed."""
@@ -125,9 +128,9 @@ class Allowances:
             LimitError: the machine scatters so much that no pose keeps it there.
         """
         ball = self.ball_at(reference)
-        records = 2.0 * SAFETY_SIGMAS**2 * self._record_covariance(ball)
-        stops = STOP_SIGMAS**2 * self.robot.noise.stop_covariance(ball.by_joints[None])[0]
-        needed = 2.0 * float(np.sqrt(np.diag(records + stops).max())) / TRAVEL_SHARE
+        at_zero = self._record_covariance(ball)
+        chance = at_zero + self.robot.noise.chance_covariance(ball.by_joints[None])[0]
+        needed = 2.0 * CHANCE_SIGMAS * float(np.sqrt(np.diag(chance).max())) / CHANCE_SHARE
         gauges, limits = self.settings.gauges, self.settings.limits
         travel = min(2.0 * limits.gauge_travel_mm, *(gauge.travel_mm for gauge in gauges))
         if needed > travel:

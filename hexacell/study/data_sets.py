@@ -115,13 +115,13 @@ def first_reached(
     """
     parts: list[Reached] = []
     for commands in drawn:
-        parts.append(_reached(robot, truth, commands, margin))
+        parts.append(reached(robot, truth, commands, margin))
         if sum(len(part.commands) for part in parts) >= wanted:
             return Reached.joined(parts)[:wanted]
     raise LimitError(f"too few poses can be reached at {point} without crossing a singularity")
 
 
-def _reached(robot: Robot, truth: Geometry, commands: PoseBatch, margin: float) -> Reached:
+def reached(robot: Robot, truth: Geometry, commands: PoseBatch, margin: float) -> Reached:
     """The commands that keep the limits and, by both geometries, a singularity margin."""
     actual = robot.commanded(truth).actual_poses(commands)
     rows = actual.found & robot.limits.allow_commands(commands) & robot.limits.allow_joints(actual.joints)

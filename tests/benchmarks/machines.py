@@ -51,6 +51,15 @@ def with_aligned_gauges() -> Cell:
     return replace(cell, settings=cell.settings.model_copy(update={"stations": stations}))
 
 
+def with_gauges_of(travel_mm: float) -> Cell:
+    """The bundled cell with gauges of another travel."""
+    cell = bundled()
+    settings = cell.settings
+    gauges = tuple(one.model_copy(update={"travel_mm": travel_mm}) for one in settings.gauges)
+    limits = settings.limits.model_copy(update={"gauge_travel_mm": travel_mm / 2.0})
+    return replace(cell, settings=settings.model_copy(update={"gauges": gauges, "limits": limits}))
+
+
 def geometry_of_table_one(cell: Cell) -> Geometry:
     """What the paper identified, in the frames of its table."""
     assert cell.settings.simulation is not None

@@ -16,13 +16,18 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.sensitivity import pose_sensitivity
 from hexacell.robot.model import Robot, robot_of
 from tests.benchmarks.figures import NEVER, at_least, least_by_chance
-from tests.benchmarks.machines import bundled, on_all_cores
+from tests.benchmarks.machines import on_all_cores, with_gauges_of
 from tests.benchmarks.samples import sample
 from tests.benchmarks.virtual_calibration import Judged, Scatter, judged, robot_that_stands
 
 MACHINES = sample(__name__, "MACHINES")
-SIZES_MM = (0.02, 0.05, 0.1)
-"""With gauges of 10 mm, and those of 50 mm for what needs them."""
+SCATTERS = (
+    *((Scatter(seen=mm), 10.0) for mm in (0.02, 0.05, 0.1, 0.2)),
+    (Scatter(seen=0.5), 50.0),
+    *((Scatter(unseen=mm), 10.0) for mm in (0.02, 0.05, 0.1)),
+    (Scatter(unseen=0.2), 20.0),
+)
+"""And the travel of the gauges, mm."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +49,8 @@ class InOneRound:
         return float(np.linalg.norm(errors, axis=-1).max())
 
 
-def calibrated(scatter: Scatter, number: int) -> Judged:
-    cell, random = bundled(), np.random.default_rng([37, number])
+def calibrated(scatter: Scatter, gauges_mm: float, number: int) -> Judged:
+    cell, random = with_gauges_of(gauges_mm), np.random.default_rng([37, number])
     robot = robot_of(cell)
     truth = robot_that_stands(cell, robot, random)
     one = judged(cell, robot, truth, random, InOneRound(scatter, random), scatter)
@@ -53,11 +58,14 @@ def calibrated(scatter: Scatter, number: int) -> Judged:
     return replace(one, done=None)
 
 
-@pytest.mark.parametrize("kind", ["seen", "unseen"])
-@pytest.mark.parametrize("size_mm", SIZES_MM)
-def test_a_machine_that_scatters_is_calibrated_and_u_covers(figure, kind: str, size_mm: float) -> None:
-    every = on_all_cores(partial(calibrated, Scatter(**{kind: size_mm})), range(MACHINES))
-    what = f"joints scatter by {size_mm:g} mm, {kind} by the encoders"
+@pytest.mark.parametrize(("scatter", "gauges_mm"), SCATTERS, ids=str)
+def test_a_machine_that_scatters_is_calibrated_and_u_covers(
+    figure, scatter: Scatter, gauges_mm: float
+) -> None:
+    every = on_all_cores(partial(calibrated, scatter, gauges_mm), range(MACHINES))
+    kind = "seen" if scatter.seen else "unseen"
+    size_mm = scatter.seen or scatter.unseen
+    what = f"joints scatter by {size_mm:g} mm, {kind} by the encoders, gauges of {gauges_mm:g} mm"
     for number, one in enumerate(every):
         if one.verdict is None:
             figure(f"  machine {number}: {one.reason}", one.true_mm, "mm")

@@ -90,6 +90,13 @@ class Noise:
         scaled = position_by_joints * self.encoders
         return np.asarray(scaled @ np.swapaxes(scaled, -1, -2))
 
+    def chance_covariance(self, position_by_joints: Array) -> Array:
+        """Covariance (n, 3, 3), mm^2, of what the gauges show at a commanded pose, by ``dP/dq`` (n, 3, 6).
+
+        By where the joints stop, whether their encoders see it or not, and by the gauges' noise.
+        """
+        return self.stop_covariance(position_by_joints) + self.record_covariance(position_by_joints)
+
     def stop_covariance(self, position_by_joints: Array) -> Array:
         """Covariance (n, 3, 3), mm^2, of where the ball comes to rest, by ``dP/dq`` (n, 3, 6)."""
         return np.asarray(self.stops**2 * position_by_joints @ np.swapaxes(position_by_joints, -1, -2))

@@ -11,6 +11,7 @@ from hexacell.campaign.planner import Plan
 from hexacell.campaign.stopping_rules import REFUSALS
 from hexacell.cell.limits import PassiveJointSettings
 from hexacell.config.interface import ControllerGeometry
+from hexacell.design.predicted_records import CHANCE_SIGMAS
 from hexacell.robot.model import make_robot
 from tests.geometries import hexaglide_geometry
 from tests.hexacell.campaign.conftest import TWO_POINTS, at_two_points
@@ -122,7 +123,7 @@ def test_deviations_keep_to_the_room_that_the_zero_leaves(campaign, two_points):
     for zero, lower, upper in (((4.6, 0.0, 0.0), -5.0, 0.4), ((-4.6, 0.0, 0.0), -0.4, 5.0)):
         decision = two_points.decide(replace(state, zero_mm=zero))
         assert isinstance(decision, MeasurePose)
-        spread = 4.0 * decision.sigma[0]
+        spread = CHANCE_SIGMAS * decision.sigma[0]
         assert decision.deviation[0] - spread >= 0.9 * lower - 1e-9
         assert decision.deviation[0] + spread <= 0.9 * upper + 1e-9
     free = two_points.decide(state)

@@ -39,8 +39,8 @@ def test_all_of_it_is_of_its_own_experiments() -> None:
     experiments = experiments_of(2)
     outcomes = {
         key: ExperimentOutcome(
-            Differences((one.repeatability_mm,), (1.0,) if one.number else (), (0.1,)),
-            Differences((10.0 * one.repeatability_mm,), (2.0,), (0.2,)),
+            Differences((one.repeatability_mm,), (1.0,) if one.number else (), (0.1,), (0.1,)),
+            Differences((10.0 * one.repeatability_mm,), (2.0,), (0.2,), (0.2,)),
         )
         for key, one in experiments.items()
     }

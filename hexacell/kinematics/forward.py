@@ -13,8 +13,8 @@ geometry and the joint variables change linearly to (G, q) in a few stages, and 
 the solution of the one before. The sign of det J changes only at a singularity. A solution on which
 the sign differs from that at x0 is on another assembly mode and counts as not found.
 
-One stage is enough where Newton's method contracts from x0 at once: the second step is at most a quarter
-of the first one.
+One stage is enough where Newton's method contracts from x0 at once: each step is at most a quarter of the
+one before.
 
 Sources: Merlet, Parallel Robots, 2nd ed. 2006 (Newton's method and assembly modes);
 Allgower and Georg, Numerical Continuation Methods, 1990;
@@ -50,7 +50,7 @@ CONTINUATION_STAGES = (2, 8, 32)
 """Numbers of stages, tried in this order."""
 
 LARGEST_CONTRACTION = 0.25
-"""Largest ratio of the first two Newton steps where one stage is enough."""
+"""Largest ratio of two Newton steps where one stage is enough."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,39 +136,40 @@ def forward_kinematics(
         mode: required assembly mode (n,); by default that of ``start``.
         tolerance_mm: largest constraint of a solution, mm.
         max_steps: number of Newton steps.
-        largest_contraction: poses whose second step is more than this share of the first are not found.
+        largest_contraction: poses of which a step is more than this share of the one before, or the first
+            one too large, are not found.
 
     Returns:
         The poses (n), and which of them were found.
     """
     positions, orientations = np.array(start.positions), np.array(start.rotations)
-    found, contracts = np.zeros(len(joints), dtype=bool), np.ones(len(joints), dtype=bool)
-    first_sizes = np.empty(len(joints))
+    found = np.zeros(len(joints), dtype=bool)
     # What follows is of the active poses; the others have their final values.
     rows, poses = np.arange(len(joints)), start
     error, jacobian = mechanism.residual_and_jacobian(geometry, poses, joints)
     required = assembly_mode(jacobian) if mode is None else mode
+    contracts = np.ones(len(joints), dtype=bool)
+    must_contract = largest_contraction < np.inf
+    most = np.full(len(joints), 1.0 if must_contract else np.inf)  # the first step is not to be shortened
     for number in range(max_steps + 1):
         errors = np.abs(error).max(axis=-1, initial=0.0)
-        converged = errors < tolerance_mm
-        # Written so that a pose with the error NaN, which no step can improve, is finished as well.
-        finished = ~(errors >= tolerance_mm) | (number == max_steps)
-        if finished.any():
-            final = rows[finished]
-            positions[final], orientations[final] = poses.positions[finished], poses.rotations[finished]
+        converged = (errors < tolerance_mm) & contracts
+        # A pose with the error NaN, which no step can improve, does not go on either.
+        goes_on = (errors >= tolerance_mm) & contracts & (number < max_steps)
+        left = np.flatnonzero(goes_on)
+        if len(left) < len(rows):
+            final = rows[~goes_on]
+            positions[final], orientations[final] = poses.positions[~goes_on], poses.rotations[~goes_on]
             final = rows[converged]
-            found[final] = contracts[final] & (assembly_mode(jacobian[converged]) == required[final])
-            left = np.flatnonzero(~finished)
-            if not len(left):
-                break
-            rows, poses, joints = rows[left], poses[left], joints[left]
+            found[final] = assembly_mode(jacobian[converged]) == required[final]
+            rows, poses, joints, most = rows[left], poses[left], joints[left], most[left]
             error, jacobian, geometry = error[left], jacobian[left], _of_rows(geometry, left)
+        if not len(left):
+            break
         step, sizes = _damped_step(jacobian, error)
-        if largest_contraction < np.inf and number < 2:
-            # The second step is compared with the first one, which was not to be shortened.
-            if number == 0:
-                first_sizes[rows] = sizes
-            contracts[rows] &= sizes <= (largest_contraction * first_sizes[rows] if number else 1.0)
+        contracts = sizes <= most
+        if must_contract:
+            most = largest_contraction * sizes
         poses = apply_twist(poses, step)
         error, jacobian = mechanism.residual_and_jacobian(geometry, poses, joints)
     return ForwardResult(PoseBatch(positions, orientations), found)

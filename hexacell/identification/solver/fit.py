@@ -215,6 +215,7 @@ class _Iterate:
         growth: the factor of the damping if the next step fails.
         failures: steps in a row after which a record had no pose.
         singular: (n,) the records that are next to a singularity, or had no pose too often.
+        missing: (n,) the records that had no pose after the step before.
     """
 
     problem: Problem
@@ -224,6 +225,7 @@ class _Iterate:
     linear: ReducedSystem
     damping: float
     singular: Mask
+    missing: Mask
     growth: float = 2.0
     failures: int = 0
 
@@ -231,7 +233,8 @@ class _Iterate:
     def at(cls, problem: Problem, precision: Array, prediction: Prediction, damping: float) -> _Iterate:
         elimination = NuisanceElimination(problem, prediction.weights)
         linear = elimination.system(prediction.residuals, prediction.jacobian)
-        return cls(problem, precision, prediction, elimination, linear, damping, prediction.singular)
+        masks = prediction.singular, np.zeros(problem.records, dtype=bool)
+        return cls(problem, precision, prediction, elimination, linear, damping, *masks)
 
     def from_centre(self, step: Array | float = 0.0) -> Array:
         """The parameters less the prior's centre (p,), mm, after a step."""
@@ -258,11 +261,11 @@ def _advance(now: _Iterate, options: SolverOptions) -> _Iterate | Termination:
     largest = float(np.abs(step / now.problem.like_a_mm).max())
     if largest < options.step_mm and now.damping <= options.damping:
         return Termination.STEP
-    trial = evaluate_step(now.problem, now.prediction, step)
+    trial = evaluate_step(now.problem, now.prediction, step, now.missing)
     if not trial.found.all():
-        failures = now.failures + 1
-        singular = ~trial.found if failures >= FAILURES_BEFORE_SINGULAR else now.singular
-        return replace(now, failures=failures, singular=singular).damped()
+        failures, missing = now.failures + 1, ~trial.found
+        singular = missing if failures >= FAILURES_BEFORE_SINGULAR else now.singular
+        return replace(now, failures=failures, missing=missing, singular=singular).damped()
     cost = now.cost(now.prediction.residuals, now.from_centre())
     actual = cost - now.cost(trial.poses.positions - now.problem.deviations, now.from_centre(step))
     if actual > 0.0:

@@ -23,6 +23,9 @@ from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import free_sensitivity
 
+STEADY = 1.0
+"""Ratio of two Newton steps beyond which the method wanders about: the legs close nowhere near."""
+
 LARGEST_AMPLIFICATION = 100.0
 """mm of the ball per mm of a slider. Beyond it a record has no information and its linearization fails."""
 
@@ -81,17 +84,32 @@ def predict(problem: Problem, free: Array, poses: PoseBatch) -> Prediction:
     )
 
 
-def evaluate_step(problem: Problem, present: Prediction, step: Array) -> ForwardResult:
+def evaluate_step(problem: Problem, present: Prediction, step: Array, doubtful: Mask) -> ForwardResult:
     """The poses after a step (p,), mm, of the free parameters.
 
-    Forward kinematics starts at the linearized poses. If that fails, it starts at the present ones.
+    Forward kinematics starts at the linearized poses, and at the present ones where that fails. ``doubtful``
+    records (n,) come first: where one of them has no pose the others are not looked for, and not missed.
     """
     geometry = problem.geometry(present.free + step)
-    for start in (apply_twist(present.poses, present.pose_jacobian @ step), present.poses):
-        result = forward_kinematics(problem.mechanism, geometry, problem.joints, start, mode=present.mode)
-        if result.found.all():
+    poses, found = present.poses, np.ones(problem.records, dtype=bool)
+    starts = apply_twist(present.poses, present.pose_jacobian @ step), present.poses
+    for some in (doubtful, ~doubtful):
+        missing = np.flatnonzero(some)
+        for start in starts:
+            if len(missing):
+                result = forward_kinematics(
+                    problem.mechanism,
+                    geometry,
+                    problem.joints[missing],
+                    start[missing],
+                    mode=present.mode[missing],
+                    largest_contraction=STEADY,
+                )
+                poses, found[missing] = poses.with_rows(missing, result.poses), result.found
+                missing = missing[~result.found]
+        if len(missing):
             break
-    return result
+    return ForwardResult(poses, found)
 
 
 def is_singular(position_by_joints: Array) -> Mask:

@@ -35,6 +35,9 @@ PATH_BATCH = 4
 """The best candidates are examined, their commands in batches, of the last size in the end, and their paths
 in smaller ones: one of the first few is usually taken."""
 
+UNCERTAIN_BATCH = 8
+"""So many are tried together on many sampled robots: most fail on the first ones, or one of the first holds."""
+
 WAYPOINT_GAIN_RATIO = 1.2
 """How much more a candidate must gain to be reached over waypoints, which take more moves."""
 
@@ -137,7 +140,7 @@ class _PathSearch:
     ) -> SelectedPose | None:
         """The first of some ranked candidates with a safe path to it; a few are examined together."""
         rows = np.arange(len(records))
-        for some in _batches(rows, len(rows) if self.travel.is_uncertain else PATH_BATCH):
+        for some in _batches(rows, UNCERTAIN_BATCH if self.travel.is_uncertain else PATH_BATCH):
             holds = self.travel.holds(records[some])
             for few in _batches(some, PATH_BATCH):
                 arguments = records[few], commands[few], gains[few]

@@ -17,6 +17,9 @@ from hexacell.kinematics.rotations import Array, Mask
 PAIRS = np.array(list(combinations(range(6), 2)))
 """Pairs of legs, counted from 0."""
 
+BLOCK = 128
+"""Poses computed at once: larger arrays get fresh memory from the system each time, which takes longer."""
+
 PARALLEL = 1e-12
 """Squared sine of the angle between two legs below which they are parallel."""
 
@@ -75,8 +78,12 @@ class Legs:
         start = np.ascontiguousarray(self.base_joints.T)
         end = np.ascontiguousarray(self.platform_joints.T)
         first, second = PAIRS.T
-        distances = segment_distances(start[:, first], end[:, first], start[:, second], end[:, second])
-        smallest: Array = distances.min(axis=0)
+        smallest = np.empty(len(self.base_joints))
+        for row in range(0, len(smallest), BLOCK):
+            some = np.s_[row : row + BLOCK]
+            starts, ends = start[..., some], end[..., some]
+            distances = segment_distances(starts[:, first], ends[:, first], starts[:, second], ends[:, second])
+            smallest[some] = distances.min(axis=0)
         return smallest
 
 

@@ -29,6 +29,9 @@ SMALL = 1e-6
 SERIES = 1e-3
 """Angle, rad, below which the first terms of the series of k's derivative are exact to rounding."""
 
+SMALLEST = 1e-300
+"""Square of an angle that changes no larger one."""
+
 _IDENTITY = np.eye(3)
 
 
@@ -84,13 +87,9 @@ def from_vector(vector: ArrayLike) -> Array:
     """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), rad (Rodrigues' formula)."""
     vector = np.asarray(vector, dtype=float)
     squared = np.einsum("...i,...i->...", vector, vector)[..., None]
-    half = 0.5 * np.sqrt(squared)
-    # Below this half angle the quotient is 1 to the last bit; at zero it is undefined.
-    if half.min(initial=1.0) > 1e-9:
-        quotient = np.sin(half) / half
-    else:
-        tiny = half < 1e-9
-        quotient = np.where(tiny, 1.0, np.sin(half) / np.where(tiny, 1.0, half))
+    # Without a turn the quotient of two very small numbers is 1, as it should be.
+    half = np.sqrt(0.25 * squared + SMALLEST)
+    quotient = np.sin(half) / half
     quadratic = 0.5 * quotient**2
     flat = (quotient * np.cos(half) * vector) @ _SKEW
     rotation: Array = flat.reshape(*vector.shape, 3)

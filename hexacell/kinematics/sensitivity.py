@@ -52,13 +52,18 @@ class Sensitivity:
 class FreeSensitivity(Batch):
     """Derivatives of a pose by the joint variables (n, m, 6) and the free parameters (n, m, p).
 
-    Rows are the ball's position, mm, then, if m is 6, the rotation vector in the base frame, rad. ``mode``
-    (n,) is the assembly mode.
+    Rows are the ball's position, mm, then, if m is 6, the rotation vector in the base frame, rad.
+    ``constraints`` (n, 6, 6) are the derivatives of the constraints by the pose.
     """
 
     joints: Array
     free: Array
-    mode: Array
+    constraints: Array
+
+    @property
+    def mode(self) -> Array:
+        """The assembly mode (n,) of each pose."""
+        return assembly_mode(self.constraints)
 
 
 def pose_sensitivity(
@@ -107,14 +112,13 @@ def free_sensitivity(
         coordinates: ``POSITION`` or ``POSE``.
 
     Returns:
-        Derivatives (n, m, 6) and (n, m, p), in mm and rad a unit of what they are by, and modes (n,).
+        Derivatives (n, m, 6) and (n, m, p), in mm and rad a unit of what they are by.
 
     Raises:
         LinAlgError: a pose is exactly at a singularity.
     """
     linear = mechanism.derivatives(geometry, poses, joints)
-    inverse, mode = np.linalg.inv(linear.pose), assembly_mode(linear.pose)
-    return _by_inverse(mechanism, linear, inverse, mode, coordinates)
+    return _by_inverse(mechanism, linear, np.linalg.inv(linear.pose), coordinates)
 
 
 def sensitivity_and_margin(
@@ -144,19 +148,19 @@ def sensitivity_and_margin(
     linear = mechanism.derivatives(geometry, poses, joints)
     is_regular = np.ones(len(joints), dtype=bool)
     try:
-        inverse, mode = np.linalg.inv(linear.pose), assembly_mode(linear.pose)
+        inverse = np.linalg.inv(linear.pose)
     except np.linalg.LinAlgError:
         is_regular = np.linalg.det(linear.pose) != 0.0
         linear = replace(linear, pose=np.where(is_regular[:, None, None], linear.pose, np.eye(6)))
-        inverse, mode = np.linalg.inv(linear.pose), assembly_mode(linear.pose)
+        inverse = np.linalg.inv(linear.pose)
     radius = float(mechanism.platform_radius(geometry))
     scaled = np.concatenate([inverse[:, :3], radius * inverse[:, 3:]], axis=1)
-    sensitivity = _by_inverse(mechanism, linear, inverse, mode, coordinates)
+    sensitivity = _by_inverse(mechanism, linear, inverse, coordinates)
     return sensitivity, _inverse_has_margin(scaled, margin) & is_regular
 
 
 def _by_inverse(
-    mechanism: Mechanism, linear: ConstraintDerivatives, inverse: Array, mode: Array, coordinates: int
+    mechanism: Mechanism, linear: ConstraintDerivatives, inverse: Array, coordinates: int
 ) -> FreeSensitivity:
     """The sensitivity by the inverses (n, 6, 6) of the pose Jacobians."""
     by_constraints = -inverse[:, :coordinates]
@@ -165,7 +169,7 @@ def _by_inverse(
     by_free: Array = np.take(of_legs, order[convention.free_rows], axis=-1)
     for row, column in convention.dependent:
         by_free[..., column] += of_legs[..., order[row]]
-    return FreeSensitivity(by_constraints * linear.joints[..., None, :], by_free, mode)
+    return FreeSensitivity(by_constraints * linear.joints[..., None, :], by_free, linear.pose)
 
 
 def singularity_margin(

@@ -122,7 +122,7 @@ def fit_regularized(
     ratios, directions = np.linalg.eigh(factor.T @ (correction * first.information) @ factor)
     unreleased = np.linalg.solve(factor.T, directions[:, ratios < RELEASE_RATIO])
     active_prior = unreleased @ unreleased.T
-    second = solve(kept, active_prior, free=first.free, poses=first.prediction.poses, options=FINE)
+    second = solve(kept, active_prior, first.prediction, FINE)
     return Identification(kept, second, active_prior)
 
 
@@ -147,7 +147,7 @@ def solve_around_singularities(
     restored = np.zeros(problem.records, dtype=bool)
     for search in itertools.count(1):
         kept = problem.subset(used)
-        solution = solve(kept, precision, free=free, poses=poses, options=options)
+        solution = solve(kept, precision, predict(kept, free, poses), options)
         if search == options.searches:
             break
         free, poses = solution.free, solution.prediction.poses
@@ -178,22 +178,19 @@ def _restorable(problem: Problem, geometry: Geometry, aside: Mask) -> tuple[Mask
     return restorable, solved.poses[clear]
 
 
-def solve(
-    problem: Problem, precision: Array, *, free: Array, poses: PoseBatch, options: SolverOptions = COARSE
-) -> Solution:
+def solve(problem: Problem, precision: Array, start: Prediction, options: SolverOptions) -> Solution:
     """Minimize the cost from some free parameters and the poses that close their geometry.
 
     Args:
         problem: the n records and the prior's centre.
         precision: (p, p) of the prior, 1/mm^2; zero for no prior.
-        free: (p,) where to start, mm.
-        poses: the platform at each record under ``free``.
+        start: the model of the records at these parameters.
         options: of the solver.
 
     Returns:
         The last iterate, and why the iteration ended there.
     """
-    now = _Iterate.at(problem, precision, predict(problem, free, poses), options.damping)
+    now = _Iterate.at(problem, precision, start, options.damping)
     iterations, ended = 0, None
     while ended is None:
         iterations += 1
@@ -285,5 +282,6 @@ def _damped_step(now: _Iterate) -> tuple[Array, float]:
 def _accepted(now: _Iterate, step: Array, poses: PoseBatch, ratio: float) -> _Iterate:
     """The iterate after a step, by the ratio of its actual to its predicted gain."""
     damping = max(now.damping * max(0.1, 1.0 - (2.0 * ratio - 1.0) ** 3), SMALLEST_DAMPING)
-    prediction = predict(now.problem, now.prediction.free + step, poses)
+    before = now.prediction
+    prediction = predict(now.problem, before.free + step, poses, before.mode)
     return _Iterate.at(now.problem, now.precision, prediction, damping)

@@ -60,13 +60,14 @@ class Prediction:
         return self.pose_jacobian[:, :3]
 
 
-def predict(problem: Problem, free: Array, poses: PoseBatch) -> Prediction:
+def predict(problem: Problem, free: Array, poses: PoseBatch, mode: Array | None = None) -> Prediction:
     """Linearize the measurement model.
 
     Args:
         problem: n records.
         free: (p,) free parameters, mm.
         poses: that close their geometry at the joint variables of the records.
+        mode: the assembly mode (n,) of the poses, if it is known.
     """
     geometry = problem.geometry(free)
     sensitivity = free_sensitivity(problem.mechanism, geometry, poses, problem.joints)
@@ -79,7 +80,7 @@ def predict(problem: Problem, free: Array, poses: PoseBatch) -> Prediction:
         weights=problem.noise.record_weights(by_joints),
         pose_jacobian=sensitivity.free,
         by_joints=by_joints,
-        mode=sensitivity.mode,
+        mode=sensitivity.mode if mode is None else mode,
         singular=is_singular(by_joints),
     )
 

@@ -76,7 +76,8 @@ def deletion_tests(
 ) -> dict[RecordId, DeletionTest]:
     """Test each record of a problem that a fit does without, but for some others."""
     used = fit.problem.record_ids
-    left_out = [record for record in problem.record_ids if record not in {*used, *without}]
+    known = {*used, *without}
+    left_out = [record for record in problem.record_ids if record not in known]
     return {
         record: _deletion_test(
             problem, record, model_at(problem, fit.free, fit.active_prior, among={*used, record})

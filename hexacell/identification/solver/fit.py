@@ -40,6 +40,7 @@ from hexacell.identification.solver.measurement_model import (
     predict,
 )
 from hexacell.identification.solver.result import Identification, Solution, Termination
+from hexacell.kinematics.forward import TOLERANCE_MM
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
@@ -77,19 +78,21 @@ class SolverOptions:
         step_mm: the iteration ends when the largest step is below this; mrad of an angle.
         iterations: the largest number of iterations in one search.
         searches: the largest number of searches around singularities.
+        closed_mm: largest constraint of a pose.
     """
 
     damping: float
     step_mm: float
     iterations: int = ITERATIONS
     searches: int = SEARCHES
+    closed_mm: float = TOLERANCE_MM
 
 
 COARSE = SolverOptions(INITIAL_DAMPING, 1e-3)
 """From the drawing, millimetres away, to near the solution."""
 
-QUICK = SolverOptions(INITIAL_DAMPING, 1e-3, iterations=60, searches=12)
-"""Twice the iterations that consistent records need."""
+QUICK = SolverOptions(INITIAL_DAMPING, 1e-3, iterations=60, searches=12, closed_mm=1e-8)
+"""Twice the iterations that consistent records need; what follows it closes the poses."""
 
 INCREMENTAL = SolverOptions(SMALL_DAMPING, 1e-3)
 """From the solution without the last record."""
@@ -213,6 +216,7 @@ class _Iterate:
         failures: steps in a row after which a record had no pose.
         singular: (n,) the records that are next to a singularity, or had no pose too often.
         missing: (n,) the records that had no pose after the step before.
+        is_last: whether no further step can lower the cost within the precision of the numbers.
     """
 
     problem: Problem
@@ -225,6 +229,7 @@ class _Iterate:
     missing: Mask
     growth: float = 2.0
     failures: int = 0
+    is_last: bool = False
 
     @classmethod
     def at(cls, problem: Problem, precision: Array, prediction: Prediction, damping: float) -> _Iterate:
@@ -254,11 +259,13 @@ def _advance(now: _Iterate, options: SolverOptions) -> _Iterate | Termination:
     """Try one step: the next iterate, or why the iteration has ended."""
     if now.singular.any():
         return Termination.SINGULAR
+    if now.is_last:
+        return Termination.PRECISION
     step, predicted = _damped_step(now)
     largest = float(np.abs(step / now.problem.like_a_mm).max())
     if largest < options.step_mm and now.damping <= options.damping:
         return Termination.STEP
-    trial = evaluate_step(now.problem, now.prediction, step, now.missing)
+    trial = evaluate_step(now.problem, now.prediction, step, now.missing, options.closed_mm)
     if not trial.found.all():
         failures, missing = now.failures + 1, ~trial.found
         singular = missing if failures >= FAILURES_BEFORE_SINGULAR else now.singular
@@ -267,7 +274,10 @@ def _advance(now: _Iterate, options: SolverOptions) -> _Iterate | Termination:
     actual = cost - now.cost(trial.poses.positions - now.problem.deviations, now.from_centre(step))
     if actual > 0.0:
         return _accepted(now, step, trial.poses, actual / predicted if predicted > 0.0 else 0.0)
-    return Termination.PRECISION if predicted <= NEGLIGIBLE_GAIN * max(cost, 1e-12) else now.damped()
+    if predicted > NEGLIGIBLE_GAIN * max(cost, 1e-12):
+        return now.damped()
+    # The numbers cannot resolve by how much the cost falls, but the gradient is exact to many more digits.
+    return replace(_accepted(now, step, trial.poses, 1.0), is_last=True)
 
 
 def _damped_step(now: _Iterate) -> tuple[Array, float]:

@@ -85,8 +85,10 @@ def predict(problem: Problem, free: Array, poses: PoseBatch, mode: Array | None 
     )
 
 
-def evaluate_step(problem: Problem, present: Prediction, step: Array, doubtful: Mask) -> ForwardResult:
-    """The poses after a step (p,), mm, of the free parameters.
+def evaluate_step(
+    problem: Problem, present: Prediction, step: Array, doubtful: Mask, closed_mm: float
+) -> ForwardResult:
+    """The poses after a step (p,), mm, of the free parameters, closed up to ``closed_mm``.
 
     Forward kinematics starts at the linearized poses, and at the present ones where that fails. ``doubtful``
     records (n,) come first: where one of them has no pose the others are not looked for, and not missed.
@@ -104,6 +106,7 @@ def evaluate_step(problem: Problem, present: Prediction, step: Array, doubtful: 
                     problem.joints[missing],
                     start[missing],
                     mode=present.mode[missing],
+                    tolerance_mm=closed_mm,
                     largest_contraction=STEADY,
                 )
                 poses, found[missing] = poses.with_rows(missing, result.poses), result.found

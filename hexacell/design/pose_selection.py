@@ -36,7 +36,7 @@ PATH_BATCH = 4
 in smaller ones: one of the first few is usually taken."""
 
 UNCERTAIN_BATCH = 8
-"""So many are tried together on many sampled robots: most fail on the first ones, or one of the first holds."""
+"""So many are tried together on many sampled robots: one of the first holds, or most fail early."""
 
 WAYPOINT_GAIN_RATIO = 1.2
 """How much more a candidate must gain to be reached over waypoints, which take more moves."""

@@ -80,10 +80,9 @@ class Legs:
         first, second = PAIRS.T
         smallest = np.empty(len(self.base_joints))
         for row in range(0, len(smallest), BLOCK):
-            some = np.s_[row : row + BLOCK]
-            starts, ends = start[..., some], end[..., some]
-            distances = segment_distances(starts[:, first], ends[:, first], starts[:, second], ends[:, second])
-            smallest[some] = distances.min(axis=0)
+            some = np.s_[..., row : row + BLOCK]
+            ends = (one[some][:, legs] for legs in (first, second) for one in (start, end))
+            smallest[some] = segment_distances(*ends).min(axis=0)
         return smallest
 
 

@@ -257,10 +257,8 @@ class _Iterate:
 
 def _advance(now: _Iterate, options: SolverOptions) -> _Iterate | Termination:
     """Try one step: the next iterate, or why the iteration has ended."""
-    if now.singular.any():
-        return Termination.SINGULAR
-    if now.is_last:
-        return Termination.PRECISION
+    if now.singular.any() or now.is_last:
+        return Termination.SINGULAR if now.singular.any() else Termination.PRECISION
     step, predicted = _damped_step(now)
     largest = float(np.abs(step / now.problem.like_a_mm).max())
     if largest < options.step_mm and now.damping <= options.damping:

@@ -90,8 +90,8 @@ def evaluate_step(
 ) -> ForwardResult:
     """The poses after a step (p,), mm, of the free parameters, closed up to ``closed_mm``.
 
-    Forward kinematics starts at the linearized poses, and at the present ones where that fails. ``doubtful``
-    records (n,) come first: where one of them has no pose the others are not looked for, and not missed.
+    Forward kinematics starts at the linearized poses, and at the present ones where that fails. Records
+    (n,) that are ``doubtful`` come first: where one has no pose the others are not looked for, nor missed.
     """
     geometry = problem.geometry(present.free + step)
     poses, found = present.poses, np.ones(problem.records, dtype=bool)

@@ -7,6 +7,7 @@ from hexacell.errors import ConvergenceError
 from hexacell.identification.problem.prior import Noise
 from hexacell.identification.solver import fit as levenberg_marquardt
 from hexacell.identification.solver.fit import FINE
+from hexacell.identification.solver.measurement_model import predict
 from hexacell.study import reference_solvers
 
 
@@ -19,13 +20,8 @@ def test_the_pairwise_minimum_is_the_unweighted_centred_one(noisy, make_problem,
     """With no noise on the encoders all weights are equal, and centring is subtracting the mean."""
     unweighted = make_problem(noisy, noise=Noise(encoder=0.0, gauge_mm=0.01))
     parameters = len(problem.prior.covariance)
-    centred = levenberg_marquardt.solve(
-        unweighted,
-        np.zeros((parameters, parameters)),
-        free=unweighted.prior.free,
-        poses=unweighted.start,
-        options=FINE,
-    )
+    start = predict(unweighted, unweighted.prior.free, unweighted.start)
+    centred = levenberg_marquardt.solve(unweighted, np.zeros((parameters, parameters)), start, FINE)
     assert centred.termination.converged
     pairwise = problem.mechanism.convention.free_parameters(reference_solvers.gauss_newton(problem))
     np.testing.assert_allclose(centred.free, pairwise, rtol=0, atol=1e-6)

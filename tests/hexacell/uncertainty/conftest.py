@@ -14,6 +14,7 @@ from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import Prior
 from hexacell.identification.solver.fit import FINE, solve
+from hexacell.identification.solver.measurement_model import predict
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
@@ -63,7 +64,7 @@ class Laboratory:
         problem = replace(self.make_problem(measurements), prior=prior)
         start = problem.solve_poses(found.free)
         assert start.found.all()
-        solution = solve(problem, prior.precision, free=found.free, poses=start.poses, options=FINE)
+        solution = solve(problem, prior.precision, predict(problem, found.free, start.poses), FINE)
         return Identification(problem, solution, prior.precision)
 
     def propagation(self, found: Identification, earlier: Mapping[str, Array] | None = None) -> Propagation:

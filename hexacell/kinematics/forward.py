@@ -140,8 +140,8 @@ def forward_kinematics(
         mode: required assembly mode (n,); by default that of ``start``.
         tolerance_mm: largest constraint of a solution, mm.
         max_steps: number of Newton steps.
-        largest_contraction: poses of which a step is more than this share of the one before, or the first
-            one too large, are not found.
+        largest_contraction: poses of which a step is more than this share of the one before are not found;
+            with less than 1, nor those whose first step is too large.
 
     Returns:
         The poses (n), and which of them were found.
@@ -153,8 +153,9 @@ def forward_kinematics(
     error, jacobian = mechanism.residual_and_jacobian(geometry, poses, joints)
     required = assembly_mode(jacobian) if mode is None else mode
     contracts = np.ones(len(joints), dtype=bool)
-    must_contract = largest_contraction < np.inf
-    most = np.full(len(joints), 1.0 if must_contract else np.inf)  # the first step is not to be shortened
+    is_limited = largest_contraction < np.inf
+    # What has to contract at once begins with a step that is not shortened.
+    most = np.full(len(joints), 1.0 if largest_contraction < 1.0 else np.inf)
     for number in range(max_steps + 1):
         errors = np.abs(error).max(axis=-1, initial=0.0)
         # A pose with the error NaN, which no step can improve, does not go on either.
@@ -172,7 +173,7 @@ def forward_kinematics(
             break
         step, sizes = _damped_step(jacobian, error)
         contracts = sizes <= most
-        if must_contract:
+        if is_limited:
             most = largest_contraction * sizes
         poses = apply_twist(poses, step)
         error, jacobian = mechanism.residual_and_jacobian(geometry, poses, joints)

@@ -23,7 +23,7 @@ from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import free_sensitivity
 
-STEADY = 1.0
+WANDERING = 1.5
 """Ratio of two Newton steps beyond which the method wanders about: the legs close nowhere near."""
 
 LARGEST_AMPLIFICATION = 100.0
@@ -107,7 +107,7 @@ def evaluate_step(
                     start[missing],
                     mode=present.mode[missing],
                     tolerance_mm=closed_mm,
-                    largest_contraction=STEADY,
+                    largest_contraction=WANDERING,
                 )
                 poses, found[missing] = poses.with_rows(missing, result.poses), result.found
                 missing = missing[~result.found]

@@ -13,6 +13,7 @@ import numpy as np
 
 from hexacell.cell.fields import LARGEST_NUMBER, Frozen
 from hexacell.errors import FileError
+from hexacell.kinematics.corrections import NO_CORRECTIONS, Corrections
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
 
@@ -54,12 +55,14 @@ def _both(one: Range, other: Range) -> Range:
 class ControllerGeometry:
     """The geometry that a controller uses, as its config states it, and the branch of the robot if any.
 
-    ``limits`` are those that the config has, if any.
+    ``limits`` are those that the config has, if any; ``corrections`` are what the controller adds to its
+    inverse kinematics.
     """
 
     geometry: Geometry
     branch: Branch
     limits: ControllerLimits = field(default=ControllerLimits())
+    corrections: Corrections = NO_CORRECTIONS
 
 
 class ConfigFormat(Protocol):

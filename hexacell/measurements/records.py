@@ -18,6 +18,9 @@ from hexacell.kinematics.rotations import Array
 Scalar = TypeVar("Scalar", bound=np.generic)
 Joints = tuple[float, float, float, float, float, float]
 Deviation = tuple[float, float, float]
+Directions = tuple[int, ...]
+"""Whether each joint last moved up, 1, or down, -1; 0 where that is not known."""
+
 RecordId = tuple[int, int]
 """Point and orientation of a record, as the user counts them."""
 
@@ -44,6 +47,7 @@ class Record:
         pose: as commanded, under the geometry in the controller at that time.
         joints: joint variables q1 to q6 from the encoders, mm or deg.
         deviation: of the ball from its position when the gauges were zeroed, along base x, y, z, mm.
+        directions: from which side each joint arrived; empty where nothing is known of that.
     """
 
     point: int
@@ -51,6 +55,7 @@ class Record:
     pose: Pose
     joints: Joints
     deviation: Deviation
+    directions: Directions = ()
 
     @property
     def id(self) -> RecordId:
@@ -124,6 +129,13 @@ class MeasurementSet:
     def deviations(self) -> Array:
         """Deviations (n, 3) from the point's reference, mm."""
         return _frozen(np.array([record.deviation for record in self.records], dtype=float).reshape(-1, 3))
+
+    @cached_property
+    def directions(self) -> Array:
+        """From which side each joint arrived (n, 6): 1 from below, -1 from above, 0 where not known."""
+        unknown = (0,) * 6
+        rows = [record.directions or unknown for record in self.records]
+        return _frozen(np.array(rows, dtype=float).reshape(-1, 6))
 
 
 def _frozen(array: NDArray[Scalar]) -> NDArray[Scalar]:

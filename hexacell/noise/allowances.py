@@ -17,8 +17,10 @@ import numpy as np
 
 from hexacell.cell.model import CellSettings
 from hexacell.design.predicted_records import CHANCE_SIGMAS
+from hexacell.distributions import student_limit
 from hexacell.errors import LimitError
 from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from hexacell.noise.ball_by_encoders import BallByEncoders
@@ -27,6 +29,9 @@ from hexacell.robot.stated import gauge_travel_of
 
 SIGMAS = 5.0
 """Standard deviations up to which a difference is chance, at some hundred stops of six joints each."""
+
+EXCEEDED = 2.87e-7
+"""Probability that a normal variable is larger than that."""
 
 SCATTER = 1.5
 """Noise of the encoders over what is stated from which the ball may leave the travel by chance."""
@@ -60,6 +65,14 @@ class Allowances:
         return self.robot.noise.stops
 
     @property
+    def stop_sigmas(self) -> float:
+        """``SIGMAS`` of the stops, and more where few visits have measured how large one is."""
+        visits = self.settings.noise.revisits
+        if not self.is_measured or not visits or self.stops <= self.settings.noise.stops:
+            return SIGMAS
+        return student_limit(LEGS * visits, EXCEEDED)
+
+    @property
     def scatters(self) -> bool:
         """Whether it was measured that the machine does not repeat, beyond what is stated of a record."""
         stated = self.settings.noise.encoder
@@ -74,7 +87,7 @@ class Allowances:
         guards, wanted = self.settings.guards, self.settings.noise
         if guards.limits == "fixed":
             return guards.following
-        stated = max(guards.following, SIGMAS * self.stops)
+        stated = max(guards.following, self.stop_sigmas * self.stops)
         if self.is_measured or not wanted.revisits:
             return stated
         reference = Pose(*self.settings.identification.points[0])
@@ -94,7 +107,7 @@ class Allowances:
             by_stops=2.0 * ball.by_joints @ ball.by_joints.T,
             explicable_mm=np.zeros(3) if is_fixed else SIGMAS * np.sqrt(np.diag(covariance)),
             joints=joints,
-            explicable_joints=0.0 if is_fixed else float(np.sqrt(2.0)) * SIGMAS * self.stops,
+            explicable_joints=0.0 if is_fixed else float(np.sqrt(2.0)) * self.stop_sigmas * self.stops,
         )
 
     def between_visits(self, reference: Pose, visits: Array) -> tuple[ReferenceChange, ...]:
@@ -118,7 +131,7 @@ class Allowances:
         if self.settings.stations.placement == "fixed":
             return np.full(3, max(stated, kept))
         scatter = self.stops * np.linalg.norm(self.ball_at(reference).by_joints, axis=1)
-        widened = np.minimum(SIGMAS * scatter, kept)
+        widened = np.minimum(self.stop_sigmas * scatter, kept)
         return np.asarray(np.maximum(stated, widened))
 
     def require_travel(self, reference: Pose) -> None:

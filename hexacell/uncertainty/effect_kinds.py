@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from hexacell.identification.problem.prior import Placement, RecordPlacement
+from hexacell.identification.problem.placement import Placement, RecordPlacement, leg_forces
 from hexacell.kinematics.parameters import LEGS, JointUnit, MachinePart
 from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effects import UM, Effect, Occurrence
@@ -185,19 +185,6 @@ def own_weight(
         return np.concatenate([each.sum(axis=-1, keepdims=True), LEGS_DIFFER * each], axis=-1)
 
     return Effect("own weight", newton, "N", Occurrence.CONSTANT, yielding, source=source)
-
-
-def leg_forces(placement: Placement, direction: Array, centre_mm: Array | None = None) -> Array:
-    """Forces (n, 6) of the legs by one newton on the platform; see :func:`own_weight` for the arguments."""
-    poses = placement.poses
-    if centre_mm is None:
-        legs = placement.mechanism.legs(placement.geometry, poses, placement.joints)
-        arms = legs.platform_joints.mean(axis=1) - poses.positions
-    else:
-        arms = poses.rotations @ centre_mm
-    wrench = np.concatenate([np.broadcast_to(direction, arms.shape), np.cross(arms, direction)], axis=-1)
-    # Virtual work: J^T t = w, with -J^-1 at hand.
-    return np.asarray(-np.einsum("nji,nj->ni", placement.by_constraints, wrench))
 
 
 def _warmer(placement: Placement, um_per_m_k: Mapping[MachinePart, float]) -> Array:

@@ -12,7 +12,8 @@ from enum import Enum
 
 import numpy as np
 
-from hexacell.identification.problem.prior import Placement, RecordPlacement, SystematicErrors
+from hexacell.identification.problem.placement import Placement, RecordPlacement
+from hexacell.identification.problem.prior import SystematicErrors
 from hexacell.kinematics.rotations import Array
 
 UM = 1e-3

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexacell.errors import IdentifiabilityError
-from hexacell.identification.problem.prior import Noise, RecordPlacement
+from hexacell.identification.problem.placement import RecordPlacement
+from hexacell.identification.problem.prior import Noise
 from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism

@@ -28,6 +28,7 @@ from hexacell.identification.data_faults.hypotheses import (
     rank_hypotheses,
 )
 from hexacell.identification.data_faults.stepwise_selection import SHOWN_DECREASE
+from hexacell.identification.problem.placement import leg_forces
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.measurement_model import NuisanceElimination
 from hexacell.identification.solver.result import Identification
@@ -37,7 +38,6 @@ from hexacell.uncertainty.effect_kinds import (
     ball_roundness,
     encoder_eccentricities,
     encoder_scales,
-    leg_forces,
     load_at_work,
     own_weight,
     rail_directions,

@@ -9,7 +9,7 @@ from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.fields import Frozen
 from hexacell.cell.model import CellSettings
 from hexacell.cell.uncertainty import LengthCheckSettings
-from hexacell.identification.problem.prior import RecordPlacement
+from hexacell.identification.problem.placement import RecordPlacement
 from hexacell.identification.solver.chi_square import SMALLEST_PROBABILITY
 from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet
@@ -98,6 +98,7 @@ def length_check(
         measured.records.joints,
         robot.frames.deviations(measured.records.deviations),
         robot.frames.base,
+        measured.records.directions,
     )
     records = LengthRecords.of(commanded, measured.records.points)
     return LengthCheck.of(records, length_standard(fixture, measured.celsius), robot.noise, judged, effects)

@@ -14,15 +14,10 @@ from functools import cached_property
 
 import numpy as np
 
+from hexacell.identification.problem.placement import RecordPlacement
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import (
-    ConstraintDerivatives,
-    Guides,
-    Mechanism,
-    free_parameter_derivatives,
-)
+from hexacell.kinematics.mechanism import Mechanism, free_parameter_derivatives
 from hexacell.kinematics.parameters import LEGS, ParameterSet, ParameterUnit
-from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
 
@@ -257,61 +252,6 @@ def drift_sigma(mechanism: Mechanism, sigma_mm: float, tolerances: Tolerances) -
     is_length = np.array([p.kind.unit is ParameterUnit.MM for p in parameters.parameters])
     share = sigma_mm / widths[is_length].max()
     return np.where(is_length, sigma_mm, share * widths)
-
-
-@dataclass(frozen=True, eq=False)
-class Placement:
-    """A robot at n poses, with the joint variables (n, 6), mm, that close its geometry there."""
-
-    mechanism: Mechanism
-    geometry: Geometry
-    poses: PoseBatch
-    joints: Array
-
-    def __len__(self) -> int:
-        return len(self.poses)
-
-    @cached_property
-    def derivatives(self) -> ConstraintDerivatives:
-        """Derivatives of the constraints."""
-        return self.mechanism.derivatives(self.geometry, self.poses, self.joints)
-
-    @cached_property
-    def guides(self) -> Guides | None:
-        """The guides of the sliders, if there are any."""
-        return self.mechanism.guides(self.geometry, self.poses, self.joints)
-
-    @cached_property
-    def by_constraints(self) -> Array:
-        """Derivatives (n, 6, 6) of the pose, mm and rad, by errors of the constraints, mm."""
-        return np.asarray(-np.linalg.inv(self.derivatives.pose))
-
-    def by_joints(self, errors: Array) -> Array:
-        """Errors of the poses (n, 6, k) by errors (n, 6, k), mm, of the joint variables."""
-        return np.asarray(self.by_constraints @ (self.derivatives.joints[..., None] * errors))
-
-    def by_parameters(self, changes: Array) -> Array:
-        """Errors of the poses (n, 6, k) by changes (P, k) of the parameters."""
-        parameters = self.mechanism.parameters
-        of_legs = np.empty_like(changes)
-        of_legs[parameters.leg_order] = changes
-        by_leg = of_legs.reshape(6, parameters.numbers_per_leg, -1)
-        return np.asarray(
-            self.by_constraints @ np.einsum("nic,ick->nik", self.derivatives.parameters, by_leg)
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class RecordPlacement(Placement):
-    """A robot at n records, and what the gauges saw there.
-
-    Attributes:
-        deviations: (n, 3), mm, along the base axes.
-        gauges: (3, 3), columns: measuring directions of the gauges.
-    """
-
-    deviations: Array
-    gauges: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)

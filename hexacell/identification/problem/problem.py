@@ -18,13 +18,8 @@ from hexacell.identification.problem.commanded_poses import (
     CommandingGeometry,
     require_consistent_encoders,
 )
-from hexacell.identification.problem.prior import (
-    Noise,
-    Prior,
-    RecordPlacement,
-    SystematicModel,
-    no_systematic_errors,
-)
+from hexacell.identification.problem.placement import RecordPlacement
+from hexacell.identification.problem.prior import Noise, Prior, SystematicModel, no_systematic_errors
 from hexacell.kinematics.forward import ForwardResult
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, Mechanism
@@ -51,6 +46,7 @@ class Problem:
     Attributes:
         joints: (n, 6), mm, measured by the encoders.
         deviations: (n, 3), mm, in the convention's base frame.
+        directions: (n, 6) from which side each joint arrived, 1 or -1; 0 where that is not known.
         first_rows: (m,) row at which each point begins.
         initial_parameters: free parameters (p,), mm, at which the solver starts: those of the last
             provisional geometry, or of the geometry that commanded most records, usually the drawing.
@@ -72,6 +68,7 @@ class Problem:
     noise: Noise
     joints: Array
     deviations: Array
+    directions: Array
     first_rows: NDArray[np.intp]
     commands: CommandedPoses
     initial_parameters: Array
@@ -141,7 +138,8 @@ class Problem:
     def measured_at(self, free: Array, poses: PoseBatch) -> RecordPlacement:
         """The robot at the records under free parameters (p,), mm, that give them these poses."""
         geometry = self.geometry(free)
-        return RecordPlacement(self.mechanism, geometry, poses, self.joints, self.deviations, self.gauges)
+        readings = self.joints, self.deviations, self.gauges, self.directions
+        return RecordPlacement(self.mechanism, geometry, poses, *readings)
 
     def solve_poses(self, free: Array) -> ForwardResult:
         """Poses that close the geometry of free parameters (p,), mm, at the records' joint variables."""
@@ -197,6 +195,7 @@ class Problem:
             self,
             joints=self.joints[kept],
             deviations=self.deviations[kept],
+            directions=self.directions[kept],
             first_rows=first_rows_of(self.labels[kept, 0]),
             commands=self.commands[kept],
             start=self.start[kept],
@@ -213,6 +212,7 @@ class Problem:
             self,
             joints=np.concatenate([self.joints, other.joints])[order],
             deviations=np.concatenate([self.deviations, other.deviations])[order],
+            directions=np.concatenate([self.directions, other.directions])[order],
             first_rows=first_rows_of(labels[order, 0]),
             commands=commands[order],
             start=PoseBatch.joined([self.start, other.start])[order],
@@ -295,6 +295,7 @@ class Assumptions:
             noise=self.noise.along(frames.base),
             joints=joints,
             deviations=deviations,
+            directions=measurements.directions[order],
             first_rows=first_rows_of(labels[:, 0]),
             commands=commands,
             initial_parameters=free,

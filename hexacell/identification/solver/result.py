@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from hexacell.errors import IdentifiabilityError
-from hexacell.identification.problem.prior import RecordPlacement
+from hexacell.identification.problem.placement import RecordPlacement
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.linear_model import LinearCosts, LinearizedModel

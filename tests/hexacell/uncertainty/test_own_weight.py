@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.prior import Placement
-from hexacell.uncertainty.effect_kinds import leg_forces, own_weight
+from hexacell.identification.problem.placement import Placement, leg_forces
+from hexacell.uncertainty.effect_kinds import own_weight
 from hexacell.uncertainty.effects import Occurrence, errors_by_effects
 from tests.hexacell.altered_records import altered
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.prior import Placement
+from hexacell.identification.problem.placement import Placement, leg_forces
 from hexacell.identification.solver.chi_square import ChiSquareVerdict
-from hexacell.uncertainty.effect_kinds import leg_forces, load_at_work, rail_waves
+from hexacell.uncertainty.effect_kinds import load_at_work, rail_waves
 from hexacell.uncertainty.possible_causes import ExcessTest, possible_causes
 from tests.hexacell.altered_records import altered
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from hexacell.identification.problem.prior import RecordPlacement
+from hexacell.identification.problem.placement import RecordPlacement
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.uncertainty.length_records import LengthRecords, LengthStandard
@@ -60,7 +60,13 @@ class TwoSeats:
             np.concatenate([pose.rotations for _, pose in rows]),
         )
         commanded = RecordPlacement(
-            found.problem.mechanism, found.geometry, commands, joints, deviations, np.eye(3)
+            found.problem.mechanism,
+            found.geometry,
+            commands,
+            joints,
+            deviations,
+            np.eye(3),
+            np.zeros_like(joints),
         )
         return LengthRecords.of(commanded, mountings)
 

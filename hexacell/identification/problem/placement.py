@@ -1,0 +1,89 @@
+"""A robot at some poses, and what small errors of its legs and joints do to these."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import ConstraintDerivatives, Guides, Mechanism
+from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.rotations import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """A robot at n poses, with the joint variables (n, 6), mm, that close its geometry there."""
+
+    mechanism: Mechanism
+    geometry: Geometry
+    poses: PoseBatch
+    joints: Array
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+    @cached_property
+    def derivatives(self) -> ConstraintDerivatives:
+        """Derivatives of the constraints."""
+        return self.mechanism.derivatives(self.geometry, self.poses, self.joints)
+
+    @cached_property
+    def guides(self) -> Guides | None:
+        """The guides of the sliders, if there are any."""
+        return self.mechanism.guides(self.geometry, self.poses, self.joints)
+
+    @cached_property
+    def by_constraints(self) -> Array:
+        """Derivatives (n, 6, 6) of the pose, mm and rad, by errors of the constraints, mm."""
+        return np.asarray(-np.linalg.inv(self.derivatives.pose))
+
+    def by_joints(self, errors: Array) -> Array:
+        """Errors of the poses (n, 6, k) by errors (n, 6, k), mm, of the joint variables."""
+        return np.asarray(self.by_constraints @ (self.derivatives.joints[..., None] * errors))
+
+    def by_parameters(self, changes: Array) -> Array:
+        """Errors of the poses (n, 6, k) by changes (P, k) of the parameters."""
+        parameters = self.mechanism.parameters
+        of_legs = np.empty_like(changes)
+        of_legs[parameters.leg_order] = changes
+        by_leg = of_legs.reshape(6, parameters.numbers_per_leg, -1)
+        return np.asarray(
+            self.by_constraints @ np.einsum("nic,ick->nik", self.derivatives.parameters, by_leg)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class RecordPlacement(Placement):
+    """A robot at n records, and what the gauges saw there.
+
+    Attributes:
+        deviations: (n, 3), mm, along the base axes.
+        gauges: (3, 3), columns: measuring directions of the gauges.
+        directions: (n, 6) from which side each joint arrived, 1 or -1; 0 where that is not known.
+    """
+
+    deviations: Array
+    gauges: Array
+    directions: Array
+
+
+def leg_forces(placement: Placement, direction: Array, centre_mm: Array | None = None) -> Array:
+    """Forces (n, 6) of the legs, N, by a weight of one newton on the platform; tension is positive.
+
+    Args:
+        placement: n poses.
+        direction: of the weight (3,), a unit vector in the convention's base frame.
+        centre_mm: where it acts (3,), in its platform frame; None: in the middle of the platform's joints.
+    """
+    poses = placement.poses
+    if centre_mm is None:
+        legs = placement.mechanism.legs(placement.geometry, poses, placement.joints)
+        arms = legs.platform_joints.mean(axis=1) - poses.positions
+    else:
+        arms = poses.rotations @ centre_mm
+    wrench = np.concatenate([np.broadcast_to(direction, arms.shape), np.cross(arms, direction)], axis=-1)
+    # Virtual work: J^T t = w, with -J^-1 at hand.
+    return np.asarray(-np.einsum("nji,nj->ni", placement.by_constraints, wrench))

@@ -1,0 +1,21 @@
+"""Backlash: a joint lags behind its encoder, by half of the lost motion on either side.
+
+An encoder on the motor counts a way that the joint does not go when it turns round (ISO 230-2, reversal
+value). The joint's place is between the two that it has when it comes from below and from above.
+"""
+
+import numpy as np
+
+from hexacell.identification.problem.placement import Placement
+from hexacell.identification.terms.term import ModelTerm
+from hexacell.kinematics.parameters import JointUnit
+from hexacell.kinematics.rotations import Array
+
+
+def backlash(size: float, unit: JointUnit = JointUnit.MM) -> ModelTerm:
+    """The backlash of each joint; ``size`` is in the unit of the joints."""
+
+    def lagging(placement: Placement, directions: Array) -> Array:
+        return np.asarray(-0.5 * placement.derivatives.joints * directions)
+
+    return ModelTerm("backlash", str(unit), size, lagging, needs_directions=True)

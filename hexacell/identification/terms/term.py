@@ -1,0 +1,57 @@
+"""A term of the model beside the geometry: one coefficient a leg, and what it does at a record.
+
+What a term does is an error of the legs' constraints, in mm of leg length, for each leg by its own
+coefficient: a leg that is longer by d has the error -d. The pose follows by ``-J^-1`` as for all such errors
+(:mod:`~hexacell.identification.problem.placement`). Before records say more, the six coefficients are
+known as a part that all legs share and a part of each leg's own, both normal with mean zero and the size
+that is stated of the term.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell.identification.problem.placement import Placement
+from hexacell.kinematics.parameters import LEGS
+from hexacell.kinematics.rotations import Array
+
+LegErrors = Callable[[Placement, Array], Array]
+"""Errors of the constraints (n, 6), mm, by one unit of each leg's own coefficient, at n poses at which the
+joints arrived from some directions (n, 6)."""
+
+CAUSES = 1 + LEGS
+"""Independent parts of six coefficients: the one that they share, and those of their own."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModelTerm:
+    """A term of the model, of one kind for all legs.
+
+    Attributes:
+        name: for people, and in documents.
+        unit: of its coefficients.
+        size: one standard deviation, in its unit, of what a coefficient may be.
+        leg_errors: what it does.
+        takes_up: the effect of the uncertainty budget that it describes, by its name; empty for none.
+        needs_directions: whether it acts by the side from which joints arrive.
+    """
+
+    name: str
+    unit: str
+    size: float
+    leg_errors: LegErrors
+    takes_up: str = ""
+    needs_directions: bool = False
+
+    @property
+    def spread(self) -> Array:
+        """(6, 7) coefficients by one standard deviation of each independent part."""
+        return self.size * np.concatenate([np.ones((LEGS, 1)), np.eye(LEGS)], axis=1)
+
+    def pose_errors(self, placement: Placement, directions: Array) -> Array:
+        """Errors of the poses (n, 6, 6), mm and rad, by one unit of each leg's coefficient."""
+        errors = self.leg_errors(placement, directions)
+        return np.asarray(placement.by_constraints * errors[:, None, :])

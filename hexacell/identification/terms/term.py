@@ -2,8 +2,8 @@
 
 What a term does is an error of the legs' constraints, in mm of leg length, for each leg by its own
 coefficient: a leg that is longer by d has the error -d. The pose follows by ``-J^-1`` as for all such
-errors (:mod:`~hexacell.identification.problem.placement`). Before records say more, the six coefficients are
-known as a part that all legs share and a part of each leg's own, both normal with mean zero and the size
+errors (:mod:`~hexacell.identification.problem.placement`). Before records say more, the six coefficients
+are known as a part that all legs share and a part of each of them, both normal with mean zero and the size
 that is stated of the term.
 """
 

@@ -3,9 +3,11 @@
 import asyncio
 import contextlib
 import fnmatch
+import gc
 import inspect
 import os
 import re
+import shutil
 import signal
 import threading
 import time
@@ -22,6 +24,11 @@ _KEPT_OPEN = re.compile(r"/mpl-data/|\.so(\.[0-9.]+)?$")
 
 # As in the program and the Makefile: threads only slow small matrices down. Numpy is imported later.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# Runs write each event through to the disk, which takes longer than the rest of them.
+MEMORY = Path("/dev/shm")
+if MEMORY.is_dir() and shutil.disk_usage(MEMORY).free > 1_000_000_000:
+    os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", str(MEMORY))
 
 settings.register_profile(
     "hexacell",
@@ -55,6 +62,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             f"these samples name no parameters of their tests: {sorted(patterns - taken)}"
         )
     items.sort(key=lambda item: item.path.parent != TESTS)
+
+
+def pytest_collection_finish() -> None:
+    """What was collected stays until the end: looking for garbage in it again and again takes seconds."""
+    gc.freeze()
 
 
 @pytest.fixture(scope="module")

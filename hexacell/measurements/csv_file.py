@@ -2,20 +2,21 @@
 
 One row per record, with the header ``point,orientation,x,y,z,a,b,c,q1,...,q6,dx,dy,dz``: the pose as
 commanded, mm and deg, the joint variables by the encoders, mm or deg as the mechanism has them, and the
-deviation from the point's first row, mm. The order of the columns is free, and other columns are ignored.
+deviation from the point's first row, mm. There may also be ``d1,...,d6``: whether each joint last moved up,
+1, or down, -1; 0 or empty where that is not known. The order of the columns is free; others are ignored.
 """
 
 import csv
 import io
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from hexacell.cell.fields import LARGEST_NUMBER
 from hexacell.errors import FileError
 from hexacell.kinematics.pose import Pose
-from hexacell.measurements.records import MeasurementSet, Record, RecordId
+from hexacell.measurements.records import Directions, MeasurementSet, Record, RecordId
 from hexacell.storage.atomic_files import read_text, write_atomically
 from hexacell.storage.toml_document import shortened
 
@@ -23,6 +24,9 @@ COUNTS = ("point", "orientation")
 NUMBERS = (*"xyzabc", "q1", "q2", "q3", "q4", "q5", "q6", "dx", "dy", "dz")
 HEADER = (*COUNTS, *NUMBERS)
 POSE_HEADER = HEADER[:8]
+DIRECTIONS = ("d1", "d2", "d3", "d4", "d5", "d6")
+"""Columns of a file with records of which it is known from which side joints arrived."""
+
 LARGEST_COUNT = 1_000_000
 MOST_RECORDS = 2000
 """An identification from so many takes a quarter of a minute."""
@@ -73,11 +77,14 @@ def write_measurements(path: Path, measurements: MeasurementSet) -> None:
     """Write a measurement file, in one step; every number reads back exactly."""
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
-    rows.writerow(HEADER)
+    further = DIRECTIONS if any(one.directions for one in measurements.records) else ()
+    rows.writerow([*HEADER, *further])
     for one in measurements.records:
         numbers = (*one.pose.as_tuple(), *one.joints, *one.deviation)
+        directions = one.directions or ("",) * len(further)
         # float(): the repr of a numpy number contains its type.
-        rows.writerow([one.point, one.orientation, *(repr(float(number)) for number in numbers)])
+        cells = (repr(float(number)) for number in numbers)
+        rows.writerow([one.point, one.orientation, *cells, *directions])
     write_atomically(path, text.getvalue().encode())
 
 
@@ -85,15 +92,16 @@ def _records(path: Path, text: str, wanted: tuple[str, ...]) -> dict[RecordId, t
     """The records, each with its line, in the order of the file; ``wanted`` are the first of ``HEADER``."""
     rows = _filled_rows(path, text)
     line, header = next(rows, (1, []))
+    if wanted == HEADER and any(name.strip() in DIRECTIONS for name in header):
+        wanted = (*HEADER, *DIRECTIONS)
     columns = _columns(path, line, header, wanted)
-    absent = ("0",) * (len(HEADER) - len(wanted))
     found: dict[RecordId, tuple[int, Record]] = {}
     for line, row in rows:
         if len(row) != len(header):
             hint = "; is the decimal sign a comma?" if len(row) > len(header) else ""
             problem = f"the row has {len(row)} cells, the header {len(header)}{hint}"
             raise FileError(problem, subject=path, line=line, action="Correct this row")
-        cells = (*(row[column] for column in columns), *absent)
+        cells = {name: row[column] for name, column in zip(wanted, columns, strict=True)}
         record = _record(path, line, cells)
         if record.id in found:
             raise FileError(
@@ -145,12 +153,23 @@ def _columns(path: Path, line: int, header: list[str], wanted: tuple[str, ...]) 
     raise FileError(problem, subject=path, line=line, action=f"The header must be {','.join(wanted)}")
 
 
-def _record(path: Path, line: int, cells: tuple[str, ...]) -> Record:
-    """The record in the cells of ``HEADER``."""
-    numbers = [_number(path, line, name, cell) for name, cell in zip(HEADER, cells, strict=True)]
+def _record(path: Path, line: int, cells: Mapping[str, str]) -> Record:
+    """The record in the cells of one row, by their columns; what is not there is 0."""
+    numbers = [_number(path, line, name, cells.get(name, "0")) for name in HEADER]
     point, orientation = int(numbers[0]), int(numbers[1])
     q1, q2, q3, q4, q5, q6, dx, dy, dz = numbers[8:]
-    return Record(point, orientation, Pose(*numbers[2:8]), (q1, q2, q3, q4, q5, q6), (dx, dy, dz))
+    joints, directions = (q1, q2, q3, q4, q5, q6), _directions(path, line, cells)
+    return Record(point, orientation, Pose(*numbers[2:8]), joints, (dx, dy, dz), directions)
+
+
+def _directions(path: Path, line: int, cells: Mapping[str, str]) -> Directions:
+    """From which side the joints arrived; empty if no cell says it."""
+    stated = [cells.get(name, "").strip() for name in DIRECTIONS]
+    for name, cell in zip(DIRECTIONS, stated, strict=True):
+        if cell not in {"", "0", "1", "-1"}:
+            problem = f'{name} is "{shortened(cell)}", but must be 1, -1, 0 or empty'
+            raise FileError(problem, subject=path, line=line, action="Correct this cell")
+    return tuple(int(cell or 0) for cell in stated) if any(stated) else ()
 
 
 def _number(path: Path, line: int, name: str, cell: str) -> float:

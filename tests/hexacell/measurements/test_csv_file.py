@@ -28,6 +28,7 @@ records = st.builds(
     pose=st.builds(Pose, finite, finite, finite, finite, finite, finite),
     joints=st.tuples(*[finite] * 6),
     deviation=st.tuples(finite, finite, finite),
+    directions=st.just(()) | st.tuples(*[st.sampled_from([1, -1, 0])] * 6),
 )
 measurement_sets = st.lists(records, max_size=8, unique_by=lambda r: (r.point, r.orientation)).map(
     lambda rows: MeasurementSet(tuple(rows))
@@ -59,6 +60,13 @@ def test_a_file_is_read_completely(read):
 def test_written_sets_read_back_exactly(csv_path, measurements):
     write_measurements(csv_path, measurements)
     assert read_measurements(csv_path, allow_partial=True) == measurements
+
+
+def test_directions_are_read_where_the_file_has_them(read):
+    rows = ["1,-1,0,,1,1", ",,,,,", "0,0,0,0,0,0", " 1,1 ,1,1,1,1"]
+    lines = [f"{HEADER},d1,d2,d3,d4,d5,d6", *(f"{row},{six}" for row, six in zip(ROWS, rows, strict=True))]
+    found = [record.directions for record in read("\n".join(lines)).records]
+    assert found == [(1, -1, 0, 0, 1, 1), (), (0,) * 6, (1,) * 6]
 
 
 def test_header_is_the_documented_one(csv_path):
@@ -123,6 +131,8 @@ MISTAKES = [
     (ROWS[1], f'1,2,"0"5{NUMBERS[1:]}', "not valid CSV", 3),
     (ROWS[3], f'4,2,"{NUMBERS}', "not valid CSV", 5),
     (ROWS[1], "a" * 200_000, "not valid CSV", 3),
+    (GOOD, f"{HEADER},d1,d2\n{ROWS[0]},1,1\n", "columns are missing: d3, d4, d5, d6", 1),
+    (GOOD, f"{HEADER},d1,d2,d3,d4,d5,d6\n{ROWS[0]},1,1,1,1,2,1\n", 'd5 is "2", but must be 1, -1, 0', 2),
 ]
 
 

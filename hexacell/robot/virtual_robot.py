@@ -1,6 +1,7 @@
 """Virtual robots: geometries drawn within the tolerances, moved by the real controller's geometry."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import singularity_margin
 from hexacell.measurements.records import Record, deviation_of, joints_of
+from hexacell.motion.arrival import UNKNOWN, arrival_directions, least_way
 from hexacell.motion.trajectory import interpolate_line, trace_path
 from hexacell.robot.model import Robot
 
@@ -29,6 +31,29 @@ AS_DRAWN_MM = 1e-3
 WEAR_SHARE = 0.1
 """Share of the tolerances by which a robot may have drifted since it was calibrated."""
 
+Beside = Callable[[PoseBatch, Array], Array]
+"""How far the joints (6,) really are beside what their encoders show, at the pose (1) that ends their way
+(k, 6); each way begins where the one before it ended."""
+
+
+@dataclass(slots=True)
+class LostMotion:
+    """Joints with backlash: each follows its encoder once that has gone through its lost motion.
+
+    Attributes:
+        sizes: (6,) lost motion of each joint, in its unit.
+        behind: (6,) how far each joint is behind its encoder; in the middle until it has moved.
+    """
+
+    sizes: Array
+    behind: Array = field(default_factory=lambda: np.zeros(6))
+
+    def __call__(self, _pose: PoseBatch, way: Array) -> Array:
+        """How far the joints are beside what their encoders show at the end of a way (k, 6)."""
+        for step in np.diff(way, axis=0):
+            self.behind = np.clip(self.behind + step, -0.5 * self.sizes, 0.5 * self.sizes)
+        return -self.behind
+
 
 class VirtualRobot:
     """Goes where its controller commands it, on its own geometry, and answers with records.
@@ -41,6 +66,7 @@ class VirtualRobot:
         stops: one standard deviation of where a joint stops beside its command, as its encoder shows it, in
             its unit; by default what the model's noise states.
         unseen: likewise beside what its encoder shows.
+        beside: what else puts joints beside what their encoders show, as :class:`LostMotion`.
         smallest_margin: the smallest singularity margin of the true geometry along all moves so far.
     """
 
@@ -52,16 +78,20 @@ class VirtualRobot:
         *,
         stops: float | None = None,
         unseen: float = 0.0,
+        beside: Beside | None = None,
     ) -> None:
         self.model = model
         self.truth = truth
         self.stops = model.noise.stops if stops is None else stops
         self.unseen = unseen
+        self.beside = beside
         self.smallest_margin = np.inf
         self._random = random or np.random.default_rng()
         self._command: Pose | None = None
         self._actual: PoseBatch | None = None
         self._shown: Array = np.full((1, 6), np.nan)
+        self._joints_commanded: Array | None = None
+        self._directions = UNKNOWN
         self._zero: Array | None = None
 
     def actual_poses(self, commands: PoseBatch) -> ActualPoses:
@@ -97,7 +127,8 @@ class VirtualRobot:
         actual = self.actual_poses(commands)
         if not actual.found[0] or self._see_margin(actual.poses, actual.joints) < self._least_margin:
             raise ReachError(f"this robot cannot reach {command}")
-        self._stop(command, actual.joints, actual.poses)
+        here = actual.joints if self._joints_commanded is None else self._joints_commanded
+        self._stop(command, np.concatenate([here, actual.joints]), actual.poses)
 
     def move(self, command: Pose) -> None:
         """Move to a command along the controller's straight line.
@@ -115,7 +146,7 @@ class VirtualRobot:
             raise LimitError("a singularity is on the line")
         poses = traced.in_shape(-1)
         self._see_margin(poses, joints)
-        self._stop(command, joints[[-1]], poses[[-1]])
+        self._stop(command, joints, poses[[-1]])
 
     def load(self, model: Robot) -> None:
         """Have the controller command with another geometry, that of ``model``; the joints stay.
@@ -151,7 +182,7 @@ class VirtualRobot:
         joints = self._shown[0] + model.noise.encoders * self._random.standard_normal(6)
         self._zero = shown if self._zero is None else self._zero
         deviation = deviation_of(shown - self._zero)
-        return Record(point, orientation, self.command, joints_of(joints), deviation)
+        return Record(point, orientation, self.command, joints_of(joints), deviation, self._directions)
 
     @property
     def command(self) -> Pose:
@@ -168,21 +199,28 @@ class VirtualRobot:
         model = self.model
         return inverse_kinematics(model.mechanism, model.commanding, model.branch, commands)
 
-    def _stop(self, command: Pose, joints: Array, poses: PoseBatch) -> None:
-        """Stop at a command, or beside it where the joints scatter.
+    def _stop(self, command: Pose, way: Array, poses: PoseBatch) -> None:
+        """Stop at a command at the end of a way of the joints (k, 6), or beside it where they scatter.
 
         Raises:
             ReachError: no pose belongs to where the joints stopped.
         """
+        model, joints = self.model, way[[-1]]
+        least = least_way(model.mechanism.words.joint_unit, self.stops)
+        self._directions = arrival_directions(way, self._directions, least)
         self._command, self._actual, self._shown = command, poses, joints
-        if not (self.stops or self.unseen):
+        self._joints_commanded = joints
+        beside = np.zeros((1, 6)) if self.beside is None else self.beside(poses, way)
+        if self.stops or self.unseen:
+            scatter = self._random.standard_normal((2, 1, 6))
+            self._shown = joints + self.stops * scatter[0]
+            beside = beside + self.unseen * scatter[1]
+        elif not np.any(beside):
             return
-        scatter = self._random.standard_normal((2, 1, 6))
-        self._shown = joints + self.stops * scatter[0]
         found = continue_solution(
-            self.model.mechanism,
+            model.mechanism,
             self.truth,
-            self._shown + self.unseen * scatter[1],
+            self._shown + beside,
             start=poses,
             start_geometry=self.truth,
             start_joints=joints,
@@ -237,13 +275,18 @@ def random_robot(
 def exact_records(robot: Robot, point: int, poses: PoseBatch) -> Iterator[Record]:
     """The records of a robot that is exactly as its controller has it, without noise.
 
+    Its joints go straight from pose to pose; from which side they arrive at the first is not known.
+
     Args:
         robot: what its controller has.
         point: counted from 1.
         poses: poses of the point, in the convention's frames, the reference first.
     """
-    joints = robot.mechanism.inverse(robot.commanding, robot.branch, poses)
+    joints, directions = robot.mechanism.inverse(robot.commanding, robot.branch, poses), UNKNOWN
+    least = least_way(robot.mechanism.words.joint_unit, robot.noise.stops)
     shown = (poses.positions - poses.positions[:1]) @ robot.frames.base
     for row in range(len(poses)):
         command = robot.to_command(poses.pose(row))
-        yield Record(point, row + 1, command, joints_of(joints[row]), deviation_of(shown[row]))
+        directions = arrival_directions(joints[max(0, row - 1) : row + 1], directions, least)
+        deviation = deviation_of(shown[row])
+        yield Record(point, row + 1, command, joints_of(joints[row]), deviation, directions)

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from hexacell.errors import IdentifiabilityError
+from hexacell.identification.choice_of_terms import choose_terms
 from hexacell.identification.data_faults import messages
 from hexacell.identification.data_faults.outlier_statistics import OutlierStatistics
 from hexacell.identification.data_faults.stepwise_selection import (
@@ -20,9 +21,11 @@ from hexacell.identification.solver.fit import (
     COARSE,
     INCREMENTAL,
     SolverOptions,
+    fit_regularized,
     solve_around_singularities,
 )
 from hexacell.identification.solver.result import GaugeFaultError, Identification
+from hexacell.identification.terms.finding import Finding, TermFinding
 from hexacell.kinematics import rotations
 from hexacell.kinematics.rotations import Array
 
@@ -52,13 +55,55 @@ def identify(problem: Problem, *, find_outliers: bool = True) -> Identification:
     _require_rotation_diversity(problem)
     if find_outliers and (fault := wrong_unit(problem)) is not None:
         raise GaugeFaultError(fault)
+    findings: tuple[TermFinding, ...] = ()
     try:
-        selection = select_faults(problem) if find_outliers else Selection.of_all(problem)
+        if find_outliers:
+            selection, findings = _without_faults(problem)
+        else:
+            selection = Selection.of_all(problem)
     except UncorrectableFaultError as refused:
         raise GaugeFaultError(messages.refused(refused)) from None
-    found = replace(selection.selected.fit, data_faults=messages.left_out(selection))
+    fit, faults = selection.selected.fit, messages.left_out(selection)
+    found = replace(fit, data_faults=faults, tried_terms=findings)
     _require_enough_records(found.problem)
     return found
+
+
+def _without_faults(problem: Problem) -> tuple[Selection, tuple[TermFinding, ...]]:
+    """The fit with the terms that the records show, without those of them that have a data fault.
+
+    What terms explain is no fault: they are chosen first, and kept unless more records would be left out.
+
+    Raises:
+        UncorrectableFaultError: neither with terms nor without can the records be used.
+    """
+    if not problem.offered:
+        return select_faults(problem), ()
+    first = fit_regularized(problem)
+    chosen = choose_terms(first)
+    if not chosen.taken:
+        return select_faults(problem), chosen.findings
+    nearly = fit_regularized(problem.started_at(first.free).with_terms(chosen.taken))
+    # What the terms do is linearized once more, where they no longer bend the geometry.
+    with_terms = problem.started_at(nearly.free).with_terms(chosen.taken)
+    if nearly.goodness.is_explained:
+        return select_faults(with_terms), chosen.findings
+    other, plain = _if_correctable(with_terms), _if_correctable(problem)
+    if other is not None and (plain is None or other.badness <= plain.badness):
+        return other, chosen.findings
+    by_faults = (
+        replace(one, finding=Finding.FAULTS) if one.finding is Finding.TAKEN else one
+        for one in chosen.findings
+    )
+    return plain or select_faults(problem), tuple(by_faults)
+
+
+def _if_correctable(problem: Problem) -> Selection | None:
+    """The fit of what has no fault; None where that cannot be told or leaves too little."""
+    try:
+        return select_faults(problem)
+    except UncorrectableFaultError:
+        return None
 
 
 def _require_enough_records(problem: Problem) -> None:

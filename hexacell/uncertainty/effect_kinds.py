@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from hexacell.identification.problem.placement import Placement, RecordPlacement, leg_forces
+from hexacell.identification.placement import Placement, RecordPlacement, leg_forces
 from hexacell.kinematics.parameters import LEGS, JointUnit, MachinePart
 from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effects import UM, Effect, Occurrence

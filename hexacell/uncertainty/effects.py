@@ -12,7 +12,7 @@ from enum import Enum
 
 import numpy as np
 
-from hexacell.identification.problem.placement import Placement, RecordPlacement
+from hexacell.identification.placement import Placement, RecordPlacement
 from hexacell.identification.problem.prior import SystematicErrors
 from hexacell.kinematics.rotations import Array
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexacell.errors import IdentifiabilityError
-from hexacell.identification.problem.placement import RecordPlacement
+from hexacell.identification.placement import RecordPlacement
 from hexacell.identification.problem.prior import Noise
 from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry

@@ -28,7 +28,7 @@ from hexacell.identification.data_faults.hypotheses import (
     rank_hypotheses,
 )
 from hexacell.identification.data_faults.stepwise_selection import SHOWN_DECREASE
-from hexacell.identification.problem.placement import leg_forces
+from hexacell.identification.placement import leg_forces
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.measurement_model import NuisanceElimination
 from hexacell.identification.solver.result import Identification

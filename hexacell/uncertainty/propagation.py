@@ -24,7 +24,7 @@ from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.frame_alignment import FrameFit
 from hexacell.identification.diagnostics.pose_accuracy import error_jacobian, teachable_frames
 from hexacell.identification.identified_zeros import IdentifiedZeros
-from hexacell.identification.problem.placement import Placement
+from hexacell.identification.placement import Placement
 from hexacell.identification.solver.measurement_model import NuisanceElimination
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import PoseBatch

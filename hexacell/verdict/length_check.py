@@ -9,7 +9,7 @@ from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.fields import Frozen
 from hexacell.cell.model import CellSettings
 from hexacell.cell.uncertainty import LengthCheckSettings
-from hexacell.identification.problem.placement import RecordPlacement
+from hexacell.identification.placement import RecordPlacement
 from hexacell.identification.solver.chi_square import SMALLEST_PROBABILITY
 from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet

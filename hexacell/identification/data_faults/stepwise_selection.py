@@ -104,6 +104,11 @@ class Selection:
     selected: CorrectedFit
     tests: dict[RecordId, DeletionTest]
 
+    @property
+    def badness(self) -> tuple[bool, int]:
+        """Whether the residuals are not explained, and how many records were left out."""
+        return not self.selected.fit.goodness.is_explained, len(self.selected.rejected)
+
     @classmethod
     def of_all(cls, problem: Problem) -> Selection:
         """The fit of all records as measured, whatever is wrong with them."""

@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from hexacell.identification.problem.placement import RecordPlacement
+from hexacell.identification.placement import RecordPlacement
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism, free_parameter_derivatives
 from hexacell.kinematics.parameters import LEGS, ParameterSet, ParameterUnit

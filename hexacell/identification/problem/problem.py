@@ -13,13 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexacell.errors import IdentifiabilityError
+from hexacell.identification.placement import RecordPlacement
 from hexacell.identification.problem.commanded_poses import (
     CommandedPoses,
     CommandingGeometry,
     require_consistent_encoders,
 )
-from hexacell.identification.problem.placement import RecordPlacement
 from hexacell.identification.problem.prior import Noise, Prior, SystematicModel, no_systematic_errors
+from hexacell.identification.terms.taken import TakenTerms
+from hexacell.identification.terms.term import ModelTerm
 from hexacell.kinematics.forward import ForwardResult
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, Mechanism
@@ -61,6 +63,8 @@ class Problem:
         unknowns: how many parameters the records are to determine, the rest of them being known from the
             prior; 0: all.
         travel_mm: measuring range of the gauges x, y and z.
+        offered: terms of the model beside the geometry that the machine may have.
+        terms: those that its records are taken to have; None for none.
     """
 
     mechanism: Mechanism
@@ -79,6 +83,8 @@ class Problem:
     systematic: SystematicModel = field(default=no_systematic_errors)
     unknowns: int = 0
     travel_mm: Deviation = NO_TRAVEL_MM
+    offered: tuple[ModelTerm, ...] = ()
+    terms: TakenTerms | None = None
 
     @property
     def basis(self) -> Array:
@@ -186,6 +192,13 @@ class Problem:
         solved = self.solve_poses(free)
         return self.starting_at(free, solved.poses, solved.found)
 
+    def with_terms(self, terms: tuple[ModelTerm, ...]) -> Problem:
+        """The problem of a machine with some terms, as they act at the start poses."""
+        if not terms:
+            return replace(self, terms=None)
+        records = self.measured_at(self.initial_parameters, self.start)
+        return replace(self, terms=TakenTerms.of(terms, records, self.has_start_pose))
+
     def subset(self, rows: Mask) -> Problem:
         """The problem of some of the records (n,)."""
         if rows.all():
@@ -201,13 +214,20 @@ class Problem:
             start=self.start[kept],
             has_start_pose=self.has_start_pose[kept],
             labels=self.labels[kept],
+            terms=self.terms and self.terms[kept],
         )
 
     def joined(self, other: Problem) -> Problem:
-        """The problem of both sets of records, which have no point in common, from the same start."""
+        """The problem of both sets of records, which have no point in common, from the same start.
+
+        Both have the same terms.
+        """
         labels = np.concatenate([self.labels, other.labels])
         order = np.argsort(labels[:, 0], kind="stable")
         commands = self.commands.joined(other.commands)
+        terms = self.terms
+        if terms is not None and other.terms is not None:
+            terms = terms.joined(other.terms)[order]
         return replace(
             self,
             joints=np.concatenate([self.joints, other.joints])[order],
@@ -218,6 +238,7 @@ class Problem:
             start=PoseBatch.joined([self.start, other.start])[order],
             has_start_pose=np.concatenate([self.has_start_pose, other.has_start_pose])[order],
             labels=labels[order],
+            terms=terms,
         )
 
 
@@ -248,6 +269,7 @@ class Assumptions:
     systematic: SystematicModel = no_systematic_errors
     unknowns: int = 0
     travel_mm: Deviation = NO_TRAVEL_MM
+    offered: tuple[ModelTerm, ...] = ()
 
     def problem(self, measurements: MeasurementSet, known: Problem | None = None) -> Problem:
         """The problem of a measurement set.
@@ -306,6 +328,7 @@ class Assumptions:
             systematic=self.systematic,
             unknowns=self.unknowns,
             travel_mm=self.travel_mm,
+            offered=self.offered,
         )
 
 

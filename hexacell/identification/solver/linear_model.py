@@ -19,7 +19,7 @@ Williams, Gaussian Processes for Machine Learning, 2006, section 2.7 (explicit b
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -135,6 +135,29 @@ class LinearCosts:
         both = np.concatenate([system, self._only_parameters(factor)])
         from_centre = factor @ (self.prediction.free - prior.free)
         return _least_squares(both, np.concatenate([values, from_centre]))[1]
+
+    def with_causes(self, columns: Array) -> LinearCosts:
+        """These records with further errors (n, 3, k), mm, that they share, each of unit variance."""
+        return replace(self, common=np.concatenate([self.common, columns], axis=-1), are_of_noise=False)
+
+    def log_evidence(self, rows: Mask, scale: float = 1.0) -> float:
+        """Logarithm of the density of some records (n,) under the full prior, but for a constant.
+
+        Parameters and causes are integrated out. The constant is that of the records and their noise, whose
+        variances are ``scale`` times as large as stated.
+        """
+        prior = self.problem.prior
+        system, values = self._system(rows)
+        factor = np.linalg.cholesky(prior.precision).T
+        whitened = len(system) - self.common.shape[-1]
+        size = np.ones(len(system))
+        size[:whitened] /= np.sqrt(scale)
+        both = np.concatenate([size[:, None] * system, self._only_parameters(factor)])
+        from_centre = factor @ (self.prediction.free - prior.free)
+        every = np.concatenate([size * values, from_centre])
+        normal, gradient = both.T @ both, both.T @ every
+        cost = float(every @ every - gradient @ np.linalg.solve(normal, gradient))
+        return -0.5 * (cost + float(np.linalg.slogdet(normal)[1]))
 
     def residual_test(self, active_prior: Array) -> ChiSquareTest:
         """The chi-square of all residuals, under a prior of precision (p, p), 1/mm^2."""

@@ -9,7 +9,8 @@ A record satisfies ``P - d = c + w x d - k * d + noise``, with the position c of
 gauges were zeroed, the small rotation w of the gauges against the base, and the scale errors k of the
 gauges, which are along their axes. All of them are linear, so for given weights their best values are
 computed and subtracted, and they never become parameters (variable projection; Golub and Pereyra 1973): c
-and w for each point, with a prior on w, and k once for all points, with a prior as well.
+and w for each point, with a prior on w, and k once for all points, with a prior as well. Coefficients of
+terms beside the geometry (:mod:`hexacell.identification.terms`) are common to all records like k.
 """
 
 from dataclasses import dataclass
@@ -142,7 +143,7 @@ class ReducedSystem:
 
 
 class NuisanceElimination:
-    """The unknowns c, w and k of the stations at their best values, for weights (n, 3, 3), 1/mm^2."""
+    """The unknowns c, w, k and those of the terms at their best values, for weights (n, 3, 3), 1/mm^2."""
 
     def __init__(self, problem: Problem, weights: Array) -> None:
         noise = problem.noise
@@ -159,13 +160,19 @@ class NuisanceElimination:
         else:
             normal = problem.group_sums(weights)
         self._station_covariance = np.linalg.inv(normal)
-        self._has_scale = noise.gauge_scale > 0.0
-        if self._has_scale:
+        self._sigmas, designs = np.zeros(0), list[Array]()
+        if noise.gauge_scale > 0.0:
             shown = problem.deviations @ problem.gauges
-            by_scale = -problem.gauges * shown[:, None, :]
-            self._scale_design, self._scale_rows = self._without_stations(by_scale)
-            normal = self._gram(self._scale_design, self._scale_rows)
-            self._scale_covariance = np.linalg.inv(normal + np.eye(3) / noise.gauge_scale**2)
+            designs.append(-problem.gauges * shown[:, None, :])
+            self._sigmas = np.full(3, noise.gauge_scale)
+        if problem.terms is not None:
+            designs.append(-problem.terms.columns)
+            self._sigmas = np.append(self._sigmas, np.ones(problem.terms.columns.shape[-1]))
+        if designs:
+            common = np.concatenate(designs, axis=-1)
+            self._common_design, self._common_rows = self._without_stations(common)
+            normal = self._gram(self._common_design, self._common_rows)
+            self.common_covariance = np.linalg.inv(normal + np.diag(self._sigmas**-2))
 
     def centred(self, values: Array) -> Array:
         """Values (n, 3, ...) less the best c, w and k."""
@@ -189,20 +196,24 @@ class NuisanceElimination:
         """Covariance (n, 3, 3), mm^2, of what is subtracted from each record."""
         spread = self._station_covariance[self._stations]
         taken = self._design @ spread @ np.swapaxes(self._design, -1, -2)
-        if self._has_scale:
-            design = self._scale_design
-            taken = taken + design @ self._scale_covariance @ np.swapaxes(design, -1, -2)
+        if len(self._sigmas):
+            design = self._common_design
+            taken = taken + design @ self.common_covariance @ np.swapaxes(design, -1, -2)
         return taken
+
+    def common(self, values: Array) -> Array:
+        """The best k, if gauges have any, and coefficients of the terms (m, j), for values (n, 3, j)."""
+        return np.asarray(self.common_covariance @ self._gram(*self._without_stations(values)))
 
     def _reduced(self, values: Array) -> tuple[Array, Array]:
         """Centred values, and the rows (r, k) that the priors add to the sum of squares."""
         flat = values.reshape(*values.shape[:2], -1)
         reduced, penalties = self._without_stations(flat)
-        if self._has_scale:
-            scale = self._scale_covariance @ self._gram(reduced, penalties)
-            reduced = reduced - self._scale_design @ scale
-            prior = scale / self.problem.noise.gauge_scale
-            penalties = np.concatenate([penalties - self._scale_rows @ scale, prior])
+        if len(self._sigmas):
+            best = self.common_covariance @ self._gram(reduced, penalties)
+            reduced = reduced - self._common_design @ best
+            prior = best / self._sigmas[:, None]
+            penalties = np.concatenate([penalties - self._common_rows @ best, prior])
         return reduced.reshape(values.shape), penalties
 
     def _without_stations(self, values: Array) -> tuple[Array, Array]:
@@ -217,6 +228,6 @@ class NuisanceElimination:
         return reduced, turned.reshape(-1, values.shape[-1])
 
     def _gram(self, values: Array, penalties: Array) -> Array:
-        """Weighted products (3, k) of the design of k with values that contain no c and w."""
-        products: Array = np.einsum("nai,nab,nbj->ij", self._scale_design, self._weights, values)
-        return products + self._scale_rows.T @ penalties
+        """Weighted products (m, j) of the common design with values that contain no c and w."""
+        products: Array = np.einsum("nai,nab,nbj->ij", self._common_design, self._weights, values)
+        return products + self._common_rows.T @ penalties

@@ -7,11 +7,13 @@ from functools import cached_property
 import numpy as np
 
 from hexacell.errors import IdentifiabilityError
-from hexacell.identification.problem.placement import RecordPlacement
+from hexacell.identification.placement import RecordPlacement
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.linear_model import LinearCosts, LinearizedModel
 from hexacell.identification.solver.measurement_model import NuisanceElimination, Prediction
+from hexacell.identification.solver.term_estimates import TermEstimates
+from hexacell.identification.terms.finding import TermFinding
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
@@ -136,12 +138,14 @@ class Identification:
         problem: the records that were used.
         solution: the solver's last iterate.
         active_prior: precision (p, p), 1/mm^2, of the prior where it was not released.
+        tried_terms: what was found of the terms beside the geometry that were offered.
     """
 
     problem: Problem
     solution: Solution
     active_prior: Array
     data_faults: tuple[DataFault, ...] = ()
+    tried_terms: tuple[TermFinding, ...] = ()
 
     @property
     def prediction(self) -> Prediction:
@@ -244,6 +248,14 @@ class Identification:
     def placement(self) -> RecordPlacement:
         """The robot at the records under the identified geometry."""
         return self.problem.measured_at(self.free, self.poses)
+
+    @cached_property
+    def terms(self) -> TermEstimates | None:
+        """What the records say of the terms beside the geometry; None where it has none."""
+        taken = self.problem.terms
+        if taken is None:
+            return None
+        return TermEstimates.at(self.problem, taken, self.prediction, self.free_covariance)
 
     @property
     def linear_model(self) -> LinearizedModel:

@@ -6,7 +6,7 @@ value). The joint's place is between the two that it has when it comes from belo
 
 import numpy as np
 
-from hexacell.identification.problem.placement import Placement
+from hexacell.identification.placement import Placement
 from hexacell.identification.terms.term import ModelTerm
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.rotations import Array

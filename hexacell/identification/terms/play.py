@@ -6,7 +6,7 @@ the platform is does not matter.
 
 import numpy as np
 
-from hexacell.identification.problem.placement import Placement, leg_forces
+from hexacell.identification.placement import Placement, leg_forces
 from hexacell.identification.terms.term import ModelTerm
 from hexacell.kinematics.rotations import Array
 

@@ -2,7 +2,7 @@
 
 What a term does is an error of the legs' constraints, in mm of leg length, for each leg by its own
 coefficient: a leg that is longer by d has the error -d. The pose follows by ``-J^-1`` as for all such
-errors (:mod:`~hexacell.identification.problem.placement`). Before records say more, the six coefficients
+errors (:mod:`~hexacell.identification.placement`). Before records say more, the six coefficients
 are known as a part that all legs share and a part of each of them, both normal with mean zero and the size
 that is stated of the term.
 """
@@ -10,11 +10,11 @@ that is stated of the term.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexacell.identification.problem.placement import Placement
+from hexacell.identification.placement import Placement
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
 
@@ -45,6 +45,10 @@ class ModelTerm:
     leg_errors: LegErrors
     takes_up: str = ""
     needs_directions: bool = False
+
+    def times(self, factor: float) -> ModelTerm:
+        """The same term of another size."""
+        return replace(self, size=factor * self.size)
 
     @property
     def spread(self) -> Array:

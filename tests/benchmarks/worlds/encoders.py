@@ -28,7 +28,7 @@ def offset(offsets: Array) -> Effect:
     return Effect(encoder_error=lambda _, shown: np.broadcast_to(offsets, shown.shape))
 
 
-def hysteresis(half_mm: float) -> Effect:
+def hysteresis(half_mm: float | Array) -> Effect:
     """Encoders, or nuts, are off by +-``half_mm`` by the direction that a slider came from."""
     return Effect(encoder_error=lambda stops, _: half_mm * stops.directions, is_random=True)
 

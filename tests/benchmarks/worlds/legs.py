@@ -24,7 +24,7 @@ def elastic(compliances: Array, weight: Array, centre: Array) -> Effect:
     return _longer(lambda pull: compliances * pull, weight, centre)
 
 
-def play(half_mm: float, weight: Array, centre: Array, soft_n: float = 0.3) -> Effect:
+def play(half_mm: float | Array, weight: Array, centre: Array, soft_n: float = 0.3) -> Effect:
     """Legs are +-``half_mm`` longer or shorter as they are pulled or pushed, softly within ``soft_n``."""
     return _longer(lambda pull: half_mm * np.tanh(pull / soft_n), weight, centre)
 

@@ -108,6 +108,7 @@ class World:
                     self.robot.to_command(commands.poses.pose(row)),
                     joints_of(joints[row]),
                     deviation_of(deviations[row]),
+                    tuple(stops.directions[row].astype(int).tolist()),
                 )
                 for row in range(len(stops))
             )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hexacell.cell.loader import load_cell
-from hexacell.identification.problem.placement import Placement
+from hexacell.identification.placement import Placement
 from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.gough_stewart import GoughStewart

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.placement import Placement, leg_forces
+from hexacell.identification.placement import Placement, leg_forces
 from hexacell.uncertainty.effect_kinds import own_weight
 from hexacell.uncertainty.effects import Occurrence, errors_by_effects
 from tests.hexacell.altered_records import altered

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.placement import Placement, leg_forces
+from hexacell.identification.placement import Placement, leg_forces
 from hexacell.identification.solver.chi_square import ChiSquareVerdict
 from hexacell.uncertainty.effect_kinds import load_at_work, rail_waves
 from hexacell.uncertainty.possible_causes import ExcessTest, possible_causes

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from hexacell.identification.problem.placement import RecordPlacement
+from hexacell.identification.placement import RecordPlacement
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.uncertainty.length_records import LengthRecords, LengthStandard

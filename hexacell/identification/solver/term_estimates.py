@@ -1,0 +1,67 @@
+"""What an identification says of the terms beside the geometry: coefficients and their uncertainty."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell.identification.problem.problem import Problem
+from hexacell.identification.solver.measurement_model import NuisanceElimination, Prediction
+from hexacell.identification.terms.taken import TakenTerms
+from hexacell.identification.terms.term import ModelTerm
+from hexacell.kinematics.parameters import LEGS
+from hexacell.kinematics.rotations import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TermEstimates:
+    """The coefficients of m terms, six each, one after the other.
+
+    Attributes:
+        values: (6 m,), each in its term's unit.
+        covariance: (6 m, 6 m) of them.
+        with_parameters: (6 m, p) their covariance with the free parameters of the geometry.
+    """
+
+    terms: tuple[ModelTerm, ...]
+    values: Array
+    covariance: Array
+    with_parameters: Array
+
+    @classmethod
+    def at(
+        cls, problem: Problem, taken: TakenTerms, prediction: Prediction, covariance: Array
+    ) -> TermEstimates:
+        """The best coefficients at a minimum of the cost.
+
+        Args:
+            problem: the records.
+            taken: the terms that they have.
+            prediction: of the records at the minimum.
+            covariance: of the free parameters there (p, p), mm^2.
+        """
+        elimination = NuisanceElimination(problem, prediction.weights)
+        causes = taken.columns.shape[-1]
+        values = elimination.common(prediction.residuals[..., None])[-causes:, 0]
+        # With other parameters, other coefficients are best.
+        by_parameters = elimination.common(prediction.jacobian)[-causes:]
+        own = elimination.common_covariance[-causes:, -causes:]
+        crossed = by_parameters @ covariance
+        spread = taken.spread
+        return cls(
+            taken.terms,
+            spread @ values,
+            spread @ (own + crossed @ by_parameters.T) @ spread.T,
+            spread @ crossed,
+        )
+
+    def of(self, name: str) -> tuple[Array, Array]:
+        """Coefficients (6,) of one term, and one standard deviation (6,) of each."""
+        row = [term.name for term in self.terms].index(name) * LEGS
+        rows = slice(row, row + LEGS)
+        return self.values[rows], np.sqrt(np.diag(self.covariance)[rows])
+
+    def joint_covariance(self, of_parameters: Array) -> Array:
+        """Covariance (p + 6 m, p + 6 m) of the free parameters (p, p) and the coefficients."""
+        return np.block([[of_parameters, self.with_parameters.T], [self.with_parameters, self.covariance]])

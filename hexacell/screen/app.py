@@ -41,6 +41,12 @@ if TYPE_CHECKING:
     from hexacell.text.screens.first_questions import FirstCellAssistant
 
 DRAWN_EVERY_S = 0.1
+MADE_EVERY_S = 0.04
+"""Pause after each screen that is made behind the first one, s: for what else is to be done meanwhile."""
+
+SHOWN_AFTER_S = 0.01
+"""Another screen is drawn so much later than asked for, s, which is made before."""
+
 LEAVING_TAKES_S = 6.0
 """Longest wait for the host's answer when a person leaves, s."""
 
@@ -94,6 +100,10 @@ class TechnicianApp(App[int]):
         """What is shown; None while it loads."""
         return self._model
 
+    def delay_update(self, delay: float = SHOWN_AFTER_S) -> None:
+        """Draw nothing while a screen takes another one's place: Textual waits until one could be made."""
+        super().delay_update(delay)
+
     def on_mount(self) -> None:
         """Load what is behind the screens once the first one is drawn."""
         self.call_after_refresh(self._begin)
@@ -117,11 +127,11 @@ class TechnicianApp(App[int]):
 
     async def _make_screens(self) -> None:
         """Make the screens behind the first one before somebody wants them, one at a time."""
-        for screen in SCREENS:
+        for screen in SCREENS[1:]:
             if self.is_running:  # what is being closed must not grow
                 # To Textual it is as if one had gone there and come back, without a frame in between.
                 await self._init_mode(screen.TAB)
-                await asyncio.sleep(DRAWN_EVERY_S)
+                await asyncio.sleep(MADE_EVERY_S)
 
     async def _has_cell(self) -> bool:
         """Whether there is a cell file, once the first-time assistant was used if it is needed."""

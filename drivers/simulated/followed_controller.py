@@ -123,6 +123,7 @@ class FollowingPhysics(RobotPhysics):
             if self._is_first:  # before, the ball was at the first point for want of anything better
                 self._is_first = False
                 self._restore_gauges()
+        self._move_platform(self._motion.path[-1])  # it may be warmer
         return now
 
     def _restore_gauges(self) -> None:
@@ -146,7 +147,7 @@ class FollowingPhysics(RobotPhysics):
             return super().encoder_positions()
 
     def _follow(self, joints: Array, now: float) -> None:
-        step = joints - self._joints
+        step = joints - self._motion.path[-1]
         largest = float(np.abs(step).max())
         if largest < MOVED_MM:
             return

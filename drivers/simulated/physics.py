@@ -1,8 +1,8 @@
 """The true state of a simulated cell: actual joint variables, actual ball position, and the sensors.
 
 Joints move along given paths at one rate with ramps at its ends, and can be stopped at any time. The
-pose under the true geometry is computed by continuation, so that the assembly mode is kept. Gauges and
-encoders add noise.
+pose under the true geometry is computed by continuation, so that the assembly mode is kept. What
+is not geometry is in :mod:`~drivers.simulated.imperfections`. Gauges and encoders add noise.
 """
 
 import threading
@@ -11,13 +11,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from drivers.simulated.imperfections import Backlash, LoadedMachine
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.cell.uncertainty import LengthCheckSettings
 from hexacell.clock import CellClock
 from hexacell.config.interface import ControllerGeometry
 from hexacell.errors import ReachError
 from hexacell.kinematics import rotations
-from hexacell.kinematics.forward import continue_solution, forward_kinematics
+from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism, inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
@@ -181,7 +182,6 @@ class RobotPhysics:
         fixture: LengthCheckSettings | None = None,
     ) -> None:
         self._truth = Geometry.of(mechanism.parameters, settings.geometry.model_dump())
-        self._mechanism = mechanism
         self.on_motion_start: Callable[[], None] = lambda: None
         self._settings = settings
         self._clock = clock
@@ -194,7 +194,6 @@ class RobotPhysics:
         shown = inverse_kinematics(mechanism, commanding.geometry, commanding.branch, start)
         joints = shown / self._shown_per_mm
         self._motion = Motion(joints[[0, 0]], -1e9, 0.0)  # standstill
-        self._joints = joints[0]
         self._rows_passed = 0
         self._unseen = np.zeros(6), np.zeros(6)
         first = continue_solution(
@@ -205,7 +204,12 @@ class RobotPhysics:
                 f"the simulated machine cannot reach {home}",
                 action="Correct [simulation.geometry], or start at another point",
             )
-        self._pose = first.poses
+        self._machine = LoadedMachine(mechanism, self._truth, settings)
+        self._start_s = clock.now()
+        gaps, of_its_own = np.array(settings.joints.backlash), np.random.default_rng([settings.seed, 2])
+        self._backlash = Backlash(gaps, joints[0], of_its_own)
+        self._pose, self._joints, self._warmer_k = first.poses, np.full(6, np.nan), 0.0
+        self._move_platform(joints[0])
         self.gauges = GaugePlaces(settings, fixture, self._random, self._pose.positions[0])
         self._draw_noise()
 
@@ -276,7 +280,7 @@ class RobotPhysics:
         while self._rows_passed + 1 <= position:
             self._rows_passed += 1
             self._move_platform(self._motion.path[self._rows_passed])
-        self._move_platform(self._motion.joints(now) + self._beside_encoders(now))
+        self._move_platform(self._motion.joints(now), self._beside_encoders(now))
         return now
 
     def _beside_encoders(self, now: float) -> Array:
@@ -285,11 +289,16 @@ class RobotPhysics:
         share = self._motion.fraction(now)
         return np.asarray((1.0 - share) * before + share * after)
 
-    def _move_platform(self, joints: Array) -> None:
-        if np.array_equal(joints, self._joints):
+    def _move_platform(self, encoders: Array, beside: Array | None = None) -> None:
+        """Move the platform as the encoders go straight to a place, and joints ``beside`` them."""
+        joints = self._backlash.follow(encoders)
+        if beside is not None:
+            joints = joints + beside
+        warmer_k = self._machine.warmer_k(self._clock.now() - self._start_s)
+        if np.array_equal(joints, self._joints) and warmer_k == self._warmer_k:
             return
-        found = forward_kinematics(self._mechanism, self._truth, joints[None], self._pose)
-        self._joints = joints
+        self._joints, self._warmer_k = joints, warmer_k
+        found = self._machine.pose(joints, warmer_k, self._pose)
         if found.found[0]:
             self._pose = found.poses
         # Otherwise the platform is at a singularity. Where a real one would go is unknown; this one

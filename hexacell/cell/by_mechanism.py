@@ -19,7 +19,7 @@ from hexacell.cell.limits import LimitSettings, SpeedSettings
 from hexacell.cell.measuring import GuardSettings, NoiseSettings, TimingSettings
 from hexacell.cell.model import CellSettings, ToleranceSettings
 from hexacell.cell.robot import ControllerSettings, RobotSettings, RotaryControllerSettings, mechanism_of
-from hexacell.cell.simulation import SimulatedEncoders, SimulatedMotion, SimulationSettings
+from hexacell.cell.simulation import SimulatedEncoders, SimulatedJoints, SimulatedMotion, SimulationSettings
 from hexacell.cell.uncertainty import (
     CommonUncertaintySettings,
     LinearUncertaintySettings,
@@ -80,7 +80,7 @@ def _cell_model(mechanism: str, encoder_scales: bool) -> type[CellSettings]:
     has_defaults = not any(field.is_required() for field in tolerances.model_fields.values())
     robot = _derived(RobotSettings, nominal=(geometry, RobotSettings.model_fields["nominal"]))
     truth = SimulationSettings.model_fields["geometry"]
-    simulated = _in_unit(found, encoders=SimulatedEncoders, motion=SimulatedMotion)
+    simulated = _in_unit(found, encoders=SimulatedEncoders, motion=SimulatedMotion, joints=SimulatedJoints)
     simulation = _derived(SimulationSettings, geometry=(geometry, truth), **simulated)
     uncertainty = uncertainty_settings(found)
     is_rotary = found.words.joint_unit is JointUnit.DEG

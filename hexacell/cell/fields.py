@@ -133,6 +133,18 @@ Item = TypeVar("Item")
 Six = tuple[Item, Item, Item, Item, Item, Item]
 """One each of the six legs or axes."""
 SixNumbers = Six[Finite]
+
+
+def _for_each(given: object) -> object:
+    if isinstance(given, int | float) and not isinstance(given, bool):
+        return (_not_negative(float(given)),) * 6
+    return tuple(given) if isinstance(given, list) else given
+
+
+SixAlike = Annotated[
+    Six[NotNegative], BeforeValidator(_for_each, json_schema_input_type=NotNegative | Six[NotNegative])
+]
+"""Six numbers, or one for all of them; a default that is one number needs ``validate_default``."""
 PointInRange = tuple[InRange, InRange, InRange]
 Direction = Annotated[PointInRange, AfterValidator(_a_direction)]
 SixInRange = Six[InRange]

@@ -1,16 +1,22 @@
 """The section of a simulated cell: its true geometry, motion, noise and faults."""
 
-from typing import Literal
+from typing import Literal, Self
+
+from pydantic import model_validator
 
 from hexacell.cell.fields import (
+    Direction,
     GeometrySettings,
     InRange,
     NotNegative,
+    PointInRange,
     Positive,
     Section,
     Seed,
+    SixAlike,
     SixInRange,
     Text,
+    broken_rule,
     key,
 )
 from hexacell.cell.robot import STARTUP_WORDS, StartupWord
@@ -97,6 +103,50 @@ class SimulatedMotion(Section):
     )
 
 
+class SimulatedJoints(Section):
+    """What lies between the simulated encoders and the joints; one number for all six, or six."""
+
+    backlash: SixAlike = key(
+        0.0,
+        "lost motion of each joint behind its encoder, as after a reversal",
+        alias="backlash_mm",
+        validate_default=True,
+    )
+
+
+class SimulatedLegs(Section):
+    """What the simulated legs do under a load; one number for all six, or six."""
+
+    play_mm: SixAlike = key(
+        0.0, "by how much each leg is longer pulled than pushed, mm", validate_default=True
+    )
+    compliance_um_n: SixAlike = key(
+        0.0, "compliance of each leg with its joints, um/N", validate_default=True
+    )
+
+
+class SimulatedLoad(Section):
+    """The weight of the simulated platform with what it carries, in the frames of [simulation.geometry]."""
+
+    weight_n: NotNegative = key(0.0, "true weight, N")
+    centre_mm: PointInRange | None = key(
+        None, "its centre in the platform frame, mm; by default the middle of the joints there"
+    )
+    direction: Direction = key((0.0, 0.0, -1.0), "where it pulls, in the base frame")
+
+
+class SimulatedTemperature(Section):
+    """How the whole simulated machine becomes warmer, evenly, from the start of the cell."""
+
+    rise_k: InRange = key(0.0, "by how much in all, K", ge=-200, le=200)
+    over_s: Positive = key(3600.0, "within which time, s of cell time; then it stays as warm")
+    expansion_base_um_m_k: NotNegative = key(
+        11.5, "thermal expansion of the base with the scales of linear encoders, um/m/K"
+    )
+    expansion_platform_um_m_k: NotNegative = key(11.5, "thermal expansion of the platform, um/m/K")
+    expansion_legs_um_m_k: NotNegative = key(11.5, "thermal expansion of the legs, um/m/K")
+
+
 class SoftLimits(Section):
     """What the simulated controller may be commanded to; it refuses any other pose and does not move."""
 
@@ -158,6 +208,19 @@ class SimulationSettings(Section):
     gauges: SimulatedGauges = SimulatedGauges()
     encoders: SimulatedEncoders = SimulatedEncoders()
     motion: SimulatedMotion = SimulatedMotion()
+    joints: SimulatedJoints = SimulatedJoints()
+    legs: SimulatedLegs = SimulatedLegs()
+    load: SimulatedLoad = SimulatedLoad()
+    temperature: SimulatedTemperature = SimulatedTemperature()
     soft_limits: SoftLimits = SoftLimits()
     fixture: SimulatedFixture = SimulatedFixture()
     faults: tuple[SimulatedFault, ...] = key((), "faults and their times", max_length=1000)
+
+    @model_validator(mode="after")
+    def _legs_need_a_load(self) -> Self:
+        if any((*self.legs.play_mm, *self.legs.compliance_um_n)) and not self.load.weight_n:
+            raise broken_rule(
+                "play and compliance of [simulation.legs] act under a weight, and there is none",
+                "Write weight_n into [simulation.load]",
+            )
+        return self

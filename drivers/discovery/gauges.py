@@ -7,16 +7,8 @@ from collections.abc import Callable, Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 
+from drivers import errors
 from drivers.discovery import USUAL, SearchTimeouts
-from drivers.errors import (
-    EmptyChannel,
-    GaugeAtEnd,
-    GaugeSilent,
-    PortLost,
-    WrongAnswer,
-    WrongSetting,
-    ZeroVoid,
-)
 from drivers.gauges.protocol import Probe
 from drivers.gauges.visa import IDENTIFY, VisaGauge, line_to
 from drivers.interfaces import Gauge
@@ -176,11 +168,11 @@ async def _channels(factory: GaugeFactory, settings: GaugeSettings, heard: list[
     for channel in CHANNELS:
         try:
             gauge = await _ask(factory, settings, channel)
-        except EmptyChannel:
+        except errors.EmptyChannel:
             continue
-        except GaugeSilent:
+        except errors.GaugeSilent:
             break
-        except WrongAnswer as error:
+        except errors.WrongAnswer as error:
             heard.append(error.problem)
             break
         found.append(gauge)
@@ -198,12 +190,12 @@ async def _ask(factory: GaugeFactory, settings: GaugeSettings, channel: int) -> 
     try:
         identity = await gauge.open()
         shown = (await gauge.read_once()).raw
-    except (WrongSetting, GaugeAtEnd, ZeroVoid) as error:  # it answered
+    except (errors.WrongSetting, errors.GaugeAtEnd, errors.ZeroVoid) as error:  # it answered
         return replace(found, problem=f"{error.problem}. {error.action}")
-    except (GaugeSilent, WrongAnswer, PortLost):
+    except (errors.GaugeSilent, errors.WrongAnswer, errors.PortLost):
         raise
     except DeviceError as error:
-        raise WrongAnswer(error.problem) from error
+        raise errors.WrongAnswer(error.problem) from error
     finally:
         await gauge.close()
         await ports.close()

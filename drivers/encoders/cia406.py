@@ -7,18 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
 
+from drivers.encoders import node_identity
 from drivers.encoders.bank import BankSession, ThreadedBank, bus_settings
 from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode, Leg, NmtCommand
-from drivers.encoders.node_identity import (
-    SECOND_RESPONSE_S,
-    check_serial_number,
-    check_step,
-    detect_nodes,
-    read_data_sheet,
-    read_device_type,
-    read_identity,
-)
 from drivers.encoders.node_monitor import AlarmPoll, AlarmTiming, NodeMonitor, check_nodes
 from drivers.encoders.object_dictionary import SYNC_COUNTER, DeviceType
 from drivers.encoders.sync_sampling import SyncSampler, configure_position_tpdo
@@ -37,7 +29,9 @@ class EncoderSession(BankSession):
     ) -> None:
         self._legs = tuple(Leg(number, node) for number, node in enumerate(settings.nodes, 1))
         super().__init__(settings, [leg.subject for leg in self._legs])
-        self._data_sheet = None if settings.eds is None else read_data_sheet(Path(settings.eds))
+        self._data_sheet = (
+            None if settings.eds is None else node_identity.read_data_sheet(Path(settings.eds))
+        )
         self.bus = EncoderBus(bus_settings(settings), closing, trace)
 
     def close(self) -> None:
@@ -59,9 +53,9 @@ class EncoderSession(BankSession):
         nodes = tuple(EncoderNode(leg, self.bus, settings.timeout_s) for leg in legs)
         for node in nodes:
             node.command(NmtCommand.ENTER_PRE_OPERATIONAL)
-        detect_nodes(nodes, self.bus, settings.timeout_s)
+        node_identity.detect_nodes(nodes, self.bus, settings.timeout_s)
         monitors = tuple(NodeMonitor(leg, self.bus, settings.heartbeat_ms) for leg in legs)
-        device_types = tuple(read_device_type(node, settings.unit) for node in nodes)
+        device_types = tuple(node_identity.read_device_type(node, settings.unit) for node in nodes)
         self.identities = tuple(map(self._identify, nodes, device_types))
         channels = tuple(
             configure_position_tpdo(node, device_type, settings.heartbeat_ms)
@@ -83,12 +77,12 @@ class EncoderSession(BankSession):
         for node in nodes:
             node.command(NmtCommand.START)
         sampler.sample()
-        self.bus.listen(SECOND_RESPONSE_S)  # to surplus responses
+        self.bus.listen(node_identity.SECOND_RESPONSE_S)  # to surplus responses
 
     def _identify(self, node: EncoderNode, device_type: DeviceType) -> DeviceIdentity:
-        check_step(node, self._settings)
-        identity = read_identity(node, device_type)
-        check_serial_number(node, identity, self._settings)
+        node_identity.check_step(node, self._settings)
+        identity = node_identity.read_identity(node, device_type)
+        node_identity.check_serial_number(node, identity, self._settings)
         if self._data_sheet is not None and (differing := self._data_sheet.check(node)):
             identity = replace(identity, remark="; ".join(filter(None, (identity.remark, differing))))
         if node.read_optional(SYNC_COUNTER):  # this program sends a SYNC without a counter

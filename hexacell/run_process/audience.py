@@ -11,17 +11,7 @@ from dataclasses import dataclass
 from socket import socket
 
 from hexacell.errors import HexacellError, UsageError
-from hexacell.run_process.messages import (
-    LONGEST_MESSAGE,
-    ControlChanged,
-    GiveCommand,
-    HostFailed,
-    HostMessage,
-    Leave,
-    TakeControl,
-    client_message,
-    message_line,
-)
+from hexacell.run_process import messages
 from hexacell.run_process.run_socket import peer_of
 from procedures.engine.commands import Command
 
@@ -85,7 +75,7 @@ class Outbox:
 class _Client:
     who: str
     outbox: Outbox
-    leave: Leave | None = None
+    leave: messages.Leave | None = None
 
 
 class Audience:
@@ -108,7 +98,7 @@ class Audience:
         *,
         on_command: Callable[[Command], None],
         on_control: Callable[[], None],
-        on_leave: Callable[[Leave | None], None],
+        on_leave: Callable[[messages.Leave | None], None],
         stuck_s: float = STUCK_S,
     ) -> None:
         self.first_came = asyncio.Event()
@@ -152,15 +142,15 @@ class Audience:
             listening.cancel()
             await self._end(client, delivering)
 
-    def send(self, message: HostMessage) -> None:
+    def send(self, message: messages.HostMessage) -> None:
         """Send a message to all clients."""
-        line = message_line(message)
+        line = messages.message_line(message)
         for client in self._clients:
             client.outbox.put(line)
 
-    def send_latest(self, message: HostMessage) -> None:
+    def send_latest(self, message: messages.HostMessage) -> None:
         """Send it to all clients who have received everything else; the others get a later one."""
-        self._latest = message_line(message)
+        self._latest = messages.message_line(message)
         for client in self._clients:
             client.outbox.offer(self._latest)
 
@@ -210,23 +200,23 @@ class Audience:
                 try:
                     self._take(line, client)
                 except HexacellError as refusal:
-                    failure = HostFailed(problem=refusal.problem, action=refusal.action or "")
-                    client.outbox.put(message_line(failure))
+                    failure = messages.HostFailed(problem=refusal.problem, action=refusal.action or "")
+                    client.outbox.put(messages.message_line(failure))
                 if client.leave is not None:
                     return
 
     def _take(self, line: bytes, client: _Client) -> None:
-        match client_message(line):
-            case GiveCommand(command=command):
+        match messages.client_message(line):
+            case messages.GiveCommand(command=command):
                 if client is not self._in_control:
                     raise UsageError(
                         f"{type(command).__name__}: {self._who or 'nobody'} is in control of this run",
                         action="Take control first",
                     )
                 self._on_command(command)
-            case TakeControl():
+            case messages.TakeControl():
                 self._give_control(client)
-            case Leave() as leave:
+            case messages.Leave() as leave:
                 client.leave = leave
 
     @property
@@ -240,13 +230,13 @@ class Audience:
         self._on_control()
 
     def _send_control(self, client: _Client) -> None:
-        changed = ControlChanged(is_in_control=client is self._in_control, who=self._who)
-        client.outbox.put(message_line(changed))
+        changed = messages.ControlChanged(is_in_control=client is self._in_control, who=self._who)
+        client.outbox.put(messages.message_line(changed))
 
 
 async def audience_server(audience: Audience, listener: socket) -> asyncio.Server:
     """The server of a run, on a socket that listens."""
-    return await asyncio.start_unix_server(audience.serve, sock=listener, limit=LONGEST_MESSAGE)
+    return await asyncio.start_unix_server(audience.serve, sock=listener, limit=messages.LONGEST_MESSAGE)
 
 
 def _name_of(user: int) -> str:

@@ -10,18 +10,9 @@ from socket import socket
 
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.errors import ExitCode, HexacellError, SeveralErrors
+from hexacell.run_process import messages
 from hexacell.run_process.audience import STUCK_S, Audience, audience_server
 from hexacell.run_process.live_devices import RunDeviceWatch
-from hexacell.run_process.messages import (
-    EventRecorded,
-    HostFailed,
-    Leave,
-    QuestionClosed,
-    QuestionOpened,
-    RunDescribed,
-    StatusChanged,
-    message_line,
-)
 from hexacell.services.run.calibration_run import RunRequest, calibrate
 from procedures.calibration.calibration import expected_records
 from procedures.devices.device_set import Devices
@@ -41,7 +32,7 @@ ABORT_S = 0.2
 """How long an abandoned computation may last that moves nothing and writes nothing but its result."""
 
 
-STOPPED = HostFailed(problem="stopped by who left it", exit_code=int(ExitCode.INTERRUPTED))
+STOPPED = messages.HostFailed(problem="stopped by who left it", exit_code=int(ExitCode.INTERRUPTED))
 
 
 class RemoteOperator:
@@ -84,7 +75,7 @@ class RunHost:
             on_leave=self._on_leave,
             stuck_s=stuck_s,
         )
-        described = RunDescribed(
+        described = messages.RunDescribed(
             cell=settings.name,
             cell_file=request.cell.path.absolute(),
             folder=request.folder.path.absolute(),
@@ -93,11 +84,11 @@ class RunHost:
                 settings, request.mode, pose_list_of(request.cell), length_check=request.length_check
             ),
         )
-        self._lines: list[bytes] = [message_line(described)]
+        self._lines: list[bytes] = [messages.message_line(described)]
         self._sequence = 0
         self._status = Status.IDLE
         self._question: Question | None = None
-        self._failure: HostFailed | None = None
+        self._failure: messages.HostFailed | None = None
         self._last: events.Event | None = None
         self._is_lost = False
         self._giving_up: asyncio.TimerHandle | None = None
@@ -147,11 +138,11 @@ class RunHost:
             return ExitCode.INTERRUPTED
         except Exception as error:
             problem = f"this is a fault of the program: {type(error).__name__}: {error}"
-            self._fail(HostFailed(problem=problem, exit_code=int(ExitCode.FAULT)))
+            self._fail(messages.HostFailed(problem=problem, exit_code=int(ExitCode.FAULT)))
             raise
         return ExitCode(ended.exit_code)
 
-    def _fail(self, failure: HostFailed) -> None:
+    def _fail(self, failure: messages.HostFailed) -> None:
         self._failure = failure
         self._audience.send(failure)
 
@@ -168,47 +159,49 @@ class RunHost:
     def _watch(self, engine: Engine, devices: Devices) -> None:
         """Called with the engine before it begins: what happened before is sent first."""
         for entry in read_entries(self._request.folder.journal):
-            self._send_event(EventRecorded(sequence=entry.number, at=entry.at, event=entry.event))
+            self._send_event(messages.EventRecorded(sequence=entry.number, at=entry.at, event=entry.event))
         self._watching.follow(engine, devices)
         engine.watch(self._on_status)
         engine.watch_questions(self._on_question)
 
     def _record(self, event: events.Event, _: RunState) -> None:
         at = now()[0]
-        self._send_event(EventRecorded(sequence=self._sequence + 1, at=at, event=event))
+        self._send_event(messages.EventRecorded(sequence=self._sequence + 1, at=at, event=event))
 
-    def _send_event(self, recorded: EventRecorded) -> None:
+    def _send_event(self, recorded: messages.EventRecorded) -> None:
         self._sequence, self._last = recorded.sequence, recorded.event
-        self._lines.append(message_line(recorded))
+        self._lines.append(messages.message_line(recorded))
         self._audience.send(recorded)
         self._watching.note(recorded.event)
 
     def _on_status(self, status: Status) -> None:
         self._status = status
-        self._audience.send(StatusChanged(status=status))
+        self._audience.send(messages.StatusChanged(status=status))
         if self._is_lost and status is Status.RUNNING:
             self._queue.put(Pause())
         self._reconsider()
 
     def _on_question(self, question: Question | None) -> None:
         self._question = question
-        self._audience.send(QuestionClosed() if question is None else QuestionOpened(question=question))
+        self._audience.send(
+            messages.QuestionClosed() if question is None else messages.QuestionOpened(question=question)
+        )
         self._reconsider()
 
     def _opening(self) -> list[bytes]:
         """The lines that a new client receives first."""
-        present = [message_line(StatusChanged(status=self._status))]
+        present = [messages.message_line(messages.StatusChanged(status=self._status))]
         if self._question is not None:
-            present.append(message_line(QuestionOpened(question=self._question)))
+            present.append(messages.message_line(messages.QuestionOpened(question=self._question)))
         if self._failure is not None:
-            present.append(message_line(self._failure))
+            present.append(messages.message_line(self._failure))
         return [*self._lines, *present]
 
     def _on_control(self) -> None:
         self._is_lost = False
         self._reconsider()
 
-    def _on_leave(self, leave: Leave | None) -> None:
+    def _on_leave(self, leave: messages.Leave | None) -> None:
         self._is_lost = leave is None
         if leave is None and self._status is Status.RUNNING:
             self._queue.put(Pause())
@@ -233,10 +226,10 @@ class RunHost:
             self._audience.send_latest(snapshot)
 
 
-def failure_message(error: HexacellError) -> HostFailed:
+def failure_message(error: HexacellError) -> messages.HostFailed:
     """An error that ends a run, as a message."""
     if isinstance(error, SeveralErrors):
-        return HostFailed(problem=str(error), exit_code=int(error.exit_code))
+        return messages.HostFailed(problem=str(error), exit_code=int(error.exit_code))
     plain = HexacellError(error.problem, subject=error.subject, line=error.line)
     text = str(plain) if type(error).__str__ is HexacellError.__str__ else str(error)
-    return HostFailed(problem=text, action=error.action or "", exit_code=int(error.exit_code))
+    return messages.HostFailed(problem=text, action=error.action or "", exit_code=int(error.exit_code))

@@ -15,24 +15,9 @@ from textual.css.query import NoMatches
 from textual.screen import Screen
 
 from hexacell.errors import HexacellError
+from hexacell.screen import overlays, tabs
 from hexacell.screen.further_screens import AssistantScreen, DigitsScreen, PlanScreen
-from hexacell.screen.overlays import (
-    ConfirmOverlay,
-    FaultOverlay,
-    HelpOverlay,
-    Leaving,
-    QuestionOverlay,
-    QuitOverlay,
-)
 from hexacell.screen.preferences import KEYS, ONCE, SCREEN_THEMES, THEMES, ScreenAction, ScreenPreferences
-from hexacell.screen.tabs import (
-    CellScreen,
-    HistoryScreen,
-    MeasureScreen,
-    PreflightScreen,
-    ReviewScreen,
-    TabScreen,
-)
 from hexacell.screen.widgets import KeyLine
 from hexacell.text.screens.views import FaultView
 
@@ -50,12 +35,12 @@ SHOWN_AFTER_S = 0.01
 LEAVING_TAKES_S = 6.0
 """Longest wait for the host's answer when a person leaves, s."""
 
-SCREENS: tuple[type[TabScreen], ...] = (
-    CellScreen,
-    PreflightScreen,
-    MeasureScreen,
-    ReviewScreen,
-    HistoryScreen,
+SCREENS: tuple[type[tabs.TabScreen], ...] = (
+    tabs.CellScreen,
+    tabs.PreflightScreen,
+    tabs.MeasureScreen,
+    tabs.ReviewScreen,
+    tabs.HistoryScreen,
 )
 
 
@@ -146,7 +131,7 @@ class TechnicianApp(App[int]):
         if self._model is None or not self.screen_stack:  # it is loading, or being closed
             return
         for screen in self.screen_stack:
-            if isinstance(screen, TabScreen | DigitsScreen | PlanScreen | QuestionOverlay):
+            if isinstance(screen, tabs.TabScreen | DigitsScreen | PlanScreen | overlays.QuestionOverlay):
                 with suppress(NoMatches):  # it is being composed, or taken away
                     screen.draw(self._model)
         if self._model.runs_followed != self._runs_seen:  # a new run is shown; overlays come after that
@@ -156,25 +141,25 @@ class TechnicianApp(App[int]):
             self._overlay_question(self._model)
             view, number = self._model.fault(), self._model.fault_number
             if view is not None and number != self._fault_seen:
-                self.push_screen(FaultOverlay(view))
+                self.push_screen(overlays.FaultOverlay(view))
             self._fault_seen = number
 
     @property
     def _is_whole(self) -> bool:
         """Whether the screen in front is made to its last line; nothing is laid above it before."""
-        if not isinstance(self.screen, TabScreen):
+        if not isinstance(self.screen, tabs.TabScreen):
             return True
         return any(line.outer_size.width == self.size.width for line in self.screen.query(KeyLine))
 
     def _overlay_question(self, model: ScreenModel) -> None:
         """Show a new question; take away one that was answered."""
         number, view = model.question_number, model.question()
-        shown = next((one for one in self.screen_stack if isinstance(one, QuestionOverlay)), None)
+        shown = next((one for one in self.screen_stack if isinstance(one, overlays.QuestionOverlay)), None)
         if shown is not None and (view is None or shown.number != number) and shown.is_current:
             shown.dismiss()
         if view is not None and number != self._question_seen:
             self._question_seen = number
-            self.push_screen(QuestionOverlay(view, number, self._answer))
+            self.push_screen(overlays.QuestionOverlay(view, number, self._answer))
 
     async def _answer(self, value: str | None) -> None:
         if self._model is not None:
@@ -195,7 +180,7 @@ class TechnicianApp(App[int]):
     def _show_error(self, error: HexacellError) -> None:
         """Show an error that a person can act on."""
         cause = str(error).removesuffix(f". {error.action}") if error.action else str(error)
-        self.push_screen(FaultOverlay(FaultView("That did not work", cause, error.action or "")))
+        self.push_screen(overlays.FaultOverlay(FaultView("That did not work", cause, error.action or "")))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Whether a key has an effect now."""
@@ -216,7 +201,7 @@ class TechnicianApp(App[int]):
     async def _confirmed(self, model: ScreenModel, action: ScreenAction, argument: str) -> str:
         """Do something, once a person has confirmed it where that is needed."""
         question = await model.confirmation(action, argument) if model.allows(action) else None
-        if question is not None and not await self.push_screen_wait(ConfirmOverlay(question)):
+        if question is not None and not await self.push_screen_wait(overlays.ConfirmOverlay(question)):
             return ""
         return await model.perform(action, argument)
 
@@ -239,7 +224,7 @@ class TechnicianApp(App[int]):
 
     def action_help(self) -> None:
         """Explain the screen in front."""
-        self.push_screen(HelpOverlay(self.current_mode, self.keys_in_use))
+        self.push_screen(overlays.HelpOverlay(self.current_mode, self.keys_in_use))
 
     def action_next_theme(self) -> None:
         """Dark, light, monochrome, in turn."""
@@ -248,13 +233,13 @@ class TechnicianApp(App[int]):
     def action_leave(self) -> None:
         """Quit; while a run goes on, ask what becomes of it."""
         if self._model is not None and self._model.may_leave_run:
-            self.push_screen(QuitOverlay(), self._leave)
+            self.push_screen(overlays.QuitOverlay(), self._leave)
         else:
             self._leave("leave")
 
     async def action_quit(self) -> None:
         """Quit by Textual's own key, ctrl+q, too."""
-        if not isinstance(self.screen, QuitOverlay):
+        if not isinstance(self.screen, overlays.QuitOverlay):
             self.action_leave()
 
     def action_help_quit(self) -> None:
@@ -263,7 +248,7 @@ class TechnicianApp(App[int]):
             f"{self.keys_in_use['quit']} leaves; what becomes of a run that goes on is asked first."
         )
 
-    def _leave(self, leaving: Leaving | None) -> None:
+    def _leave(self, leaving: overlays.Leaving | None) -> None:
         if leaving in {"stop", "leave"}:
             self.run_worker(self._quit(keep_running=leaving == "leave"), exit_on_error=False)
 

@@ -19,29 +19,10 @@ from hexacell.screen.workplace import Workplace
 from hexacell.services.history.run_index import PastRun
 from hexacell.text.config_changes import RELOAD, versions_text
 from hexacell.text.history import NO_RUNS, history_head, history_line
-from hexacell.text.screens.live import (
-    CHECKING,
-    PRESS_CHECK,
-    PRESS_LENGTH,
-    RUNNING,
-    STARTING,
-    device_lines,
-    gauge_figure,
-    live_items,
-    unchecked_items,
-    urgency_of,
-)
+from hexacell.text.screens import live, reviewing
 from hexacell.text.screens.measuring import accuracy_plot, fault_view, guidance, record_lines
 from hexacell.text.screens.planned_poses import plan_lines, plan_note, plan_rows
 from hexacell.text.screens.questions import PERSON, question_view
-from hexacell.text.screens.reviewing import (
-    READING,
-    WHAT_TO_PRESS,
-    review_plots,
-    review_texts,
-    rollback_question,
-    verdict_urgency,
-)
 from hexacell.text.screens.run_picture import header_line
 from hexacell.text.screens.views import ChecklistItem, FaultView, Line, QuestionView, Urgency
 from procedures.calibration.calibration import Mode
@@ -182,8 +163,8 @@ class ScreenModel:
             case "preflight":
                 checked = self._checked
                 if checked is None:
-                    checked = unchecked_items(is_checking=self._is_checking)
-                items = (*live_items(self._live()[0]), *checked)
+                    checked = live.unchecked_items(is_checking=self._is_checking)
+                items = (*live.live_items(self._live()[0]), *checked)
                 return {
                     "instruction": (self._instruction(),),
                     "checklist": ([line for item in items for line in item.lines],),
@@ -195,15 +176,15 @@ class ScreenModel:
             case "measure":
                 return {
                     "guidance": (guidance(picture, cell.settings),),
-                    "devices": (device_lines(*self._measured()),),
+                    "devices": (live.device_lines(*self._measured()),),
                     "records": (record_lines(picture),),
                     "accuracy": (accuracy_plot(picture, cell.settings.identification.target_mm),),
                 }
             case "review":
                 return self._result()
             case "history":
-                title = history_head() if self.runs else READING if self.runs is None else NO_RUNS
-                asked = () if self.runs is None else (*WHAT_TO_PRESS, "", *self._compared)
+                title = history_head() if self.runs else reviewing.READING if self.runs is None else NO_RUNS
+                asked = () if self.runs is None else (*reviewing.WHAT_TO_PRESS, "", *self._compared)
                 rows = [(run.name, history_line(run)) for run in self.runs or ()]
                 return {"history-header": (title,), "comparison": (asked,), "runs": (rows,)}
             case _:
@@ -214,7 +195,7 @@ class ScreenModel:
         snapshot, later_s = self._live()
         if self._devices.problem and snapshot is None:
             return [(self._devices.problem, Urgency.CALM)]
-        return device_lines(snapshot, later_s)
+        return live.device_lines(snapshot, later_s)
 
     def _live(self) -> tuple[LiveSnapshot | None, float]:
         """What the devices showed last, and how long ago, s."""
@@ -237,21 +218,21 @@ class ScreenModel:
     def _instruction(self) -> str:
         """What to press before a run, or why none can be started now."""
         if self._is_checking:
-            return CHECKING
+            return live.CHECKING
         if self._is_running or self._is_starting:
-            return RUNNING if self._is_running else STARTING
+            return live.RUNNING if self._is_running else live.STARTING
         has_fixture = self._workplace.cell.settings.length_check is not None
-        return f"{PRESS_CHECK} {PRESS_LENGTH}" if has_fixture else PRESS_CHECK
+        return f"{live.PRESS_CHECK} {live.PRESS_LENGTH}" if has_fixture else live.PRESS_CHECK
 
     def mounting(self) -> list[Line]:
         """How each gauge is to be moved while the gauges are placed."""
-        return device_lines(*self._measured(), self._workplace.cell.settings.stations.mounting_mm)
+        return live.device_lines(*self._measured(), self._workplace.cell.settings.stations.mounting_mm)
 
     def figures(self) -> tuple[str, list[Line], int]:
         """What happens now, the figure of each gauge, and the number of records."""
         snapshot, _, zero = self._measured()
         gauges = () if snapshot is None else snapshot.gauges
-        figures = [(gauge_figure(one, zero), urgency_of(one.problem)) for one in gauges]
+        figures = [(live.gauge_figure(one, zero), live.urgency_of(one.problem)) for one in gauges]
         records = sum(len(measured.samples) for measured in self._run.picture.state.sets.values())
         return guidance(self._run.picture, self._workplace.cell.settings)["Now"], figures, records
 
@@ -260,10 +241,10 @@ class ScreenModel:
         picture, may_write = self._run.picture, bool(self.proposing_run)
         seen = (picture.state, picture.question, may_write)
         if self._reviewed is None or not all(map(is_, self._reviewed[0], seen)):
-            texts = review_texts(picture, self._workplace.cell.settings, may_write=may_write)
+            texts = reviewing.review_texts(picture, self._workplace.cell.settings, may_write=may_write)
             shown: dict[str, tuple[Any, ...]] = {name: (text,) for name, text in texts.items()}
-            shown["verdict"] = (texts["verdict"], verdict_urgency(picture.state))
-            plots = enumerate(review_plots(picture))
+            shown["verdict"] = (texts["verdict"], reviewing.verdict_urgency(picture.state))
+            plots = enumerate(reviewing.review_plots(picture))
             self._reviewed = (seen, shown | {f"plot-{number}": (plot,) for number, plot in plots})
         return self._reviewed[1]
 
@@ -310,7 +291,7 @@ class ScreenModel:
                 return question_view(await self._workplace.approval(argument), None)
             case ScreenAction.ROLL_BACK:
                 is_there = await self._workplace.is_in_controller(argument)
-                return rollback_question(argument, is_in_controller=is_there)
+                return reviewing.rollback_question(argument, is_in_controller=is_there)
             case _:
                 return None
 

@@ -10,19 +10,8 @@ from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.screen import Screen
 
+from hexacell.screen import widgets
 from hexacell.screen.preferences import WITH_LENGTH
-from hexacell.screen.widgets import (
-    DevicePanel,
-    GuidancePanel,
-    KeyLine,
-    PlotPanel,
-    RowList,
-    TabLine,
-    TextList,
-    TextPanel,
-    TopLine,
-    show_parts,
-)
 
 if TYPE_CHECKING:
     from hexacell.screen.model import ScreenModel
@@ -39,10 +28,10 @@ class TabScreen(Screen[None]):
 
     def compose(self) -> ComposeResult:
         """The first lines, what is its own, and the footer."""
-        yield TopLine()
-        yield TabLine(self.TAB, self._keys)
+        yield widgets.TopLine()
+        yield widgets.TabLine(self.TAB, self._keys)
         yield from self.compose_body()
-        yield KeyLine(self._keys)
+        yield widgets.KeyLine(self._keys)
 
     def compose_body(self) -> ComposeResult:
         """What this screen has of its own."""
@@ -50,9 +39,9 @@ class TabScreen(Screen[None]):
 
     def draw(self, model: ScreenModel) -> None:
         """Show what is so now."""
-        self.query_one(TopLine).show(*model.header())
-        show_parts(self, model, self.TAB)
-        self.query_one(KeyLine).show(model.allows)
+        self.query_one(widgets.TopLine).show(*model.header())
+        widgets.show_parts(self, model, self.TAB)
+        self.query_one(widgets.KeyLine).show(model.allows)
 
 
 class CellScreen(TabScreen):
@@ -63,10 +52,10 @@ class CellScreen(TabScreen):
 
     def compose_body(self) -> ComposeResult:
         """The parts of this screen."""
-        yield TextPanel("Devices, as they show now", classes="title")
-        yield DevicePanel(id="devices")
-        yield TextPanel("Cell file", id="settings-title", classes="title")
-        yield TextList(id="settings")
+        yield widgets.TextPanel("Devices, as they show now", classes="title")
+        yield widgets.DevicePanel(id="devices")
+        yield widgets.TextPanel("Cell file", id="settings-title", classes="title")
+        yield widgets.TextList(id="settings")
 
 
 class PreflightScreen(TabScreen):
@@ -88,11 +77,11 @@ class PreflightScreen(TabScreen):
 
     def compose_body(self) -> ComposeResult:
         """The parts of this screen."""
-        yield TextPanel(id="instruction", classes="instruction")
-        yield TextPanel("What must hold before the robot moves", classes="title")
-        yield TextList(id="checklist")
-        yield TextPanel("The plan", classes="title")
-        yield TextList(id="plan")
+        yield widgets.TextPanel(id="instruction", classes="instruction")
+        yield widgets.TextPanel("What must hold before the robot moves", classes="title")
+        yield widgets.TextList(id="checklist")
+        yield widgets.TextPanel("The plan", classes="title")
+        yield widgets.TextList(id="plan")
 
 
 RECORDS_HEADER = f"{'point/pose':12}{'x':>8}{'y':>8}{'z':>8}{'residual':>9}{'sigma':>6}"
@@ -118,15 +107,17 @@ class MeasureScreen(TabScreen):
 
     def compose_body(self) -> ComposeResult:
         """The parts of this screen."""
-        yield GuidancePanel(id="guidance")
-        yield TextPanel("Devices", id="devices-title", classes="title")
-        yield DevicePanel(id="devices")
+        yield widgets.GuidancePanel(id="guidance")
+        yield widgets.TextPanel("Devices", id="devices-title", classes="title")
+        yield widgets.DevicePanel(id="devices")
         with Horizontal(id="lower"):
             with Vertical(id="record-side"):
-                yield TextPanel("Records: deviation and residual, mm", id="records-title", classes="title")
-                yield TextPanel(RECORDS_HEADER, id="records-header", classes="table-header")
-                yield TextList(id="records", follows=True)
-            yield PlotPanel(id="accuracy")
+                yield widgets.TextPanel(
+                    "Records: deviation and residual, mm", id="records-title", classes="title"
+                )
+                yield widgets.TextPanel(RECORDS_HEADER, id="records-header", classes="table-header")
+                yield widgets.TextList(id="records", follows=True)
+            yield widgets.PlotPanel(id="accuracy")
 
 
 PLOTS = 3
@@ -140,21 +131,21 @@ class ReviewScreen(TabScreen):
 
     def compose_body(self) -> ComposeResult:
         """The parts of this screen."""
-        yield TextPanel(id="verdict")
-        yield TextPanel(id="scope")
-        yield TextPanel(id="approval")
+        yield widgets.TextPanel(id="verdict")
+        yield widgets.TextPanel(id="scope")
+        yield widgets.TextPanel(id="approval")
         with VerticalScroll(id="details"):
-            yield TextPanel("Held-out poses, before and after", classes="title")
-            yield TextPanel(id="comparison")
+            yield widgets.TextPanel("Held-out poses, before and after", classes="title")
+            yield widgets.TextPanel(id="comparison")
             with Horizontal(id="plots"):
                 for number in range(PLOTS):
-                    yield PlotPanel(id=f"plot-{number}", classes="plot")
+                    yield widgets.PlotPanel(id=f"plot-{number}", classes="plot")
             with Vertical():
-                yield TextPanel("Parameters", classes="title")
-                yield TextPanel(id="parameters-header", classes="table-header")
-                yield TextPanel(id="parameters")
-                yield TextPanel("The change of the controller's config", classes="title")
-                yield TextPanel(id="change")
+                yield widgets.TextPanel("Parameters", classes="title")
+                yield widgets.TextPanel(id="parameters-header", classes="table-header")
+                yield widgets.TextPanel(id="parameters")
+                yield widgets.TextPanel("The change of the controller's config", classes="title")
+                yield widgets.TextPanel(id="change")
 
 
 class HistoryScreen(TabScreen):
@@ -173,10 +164,10 @@ class HistoryScreen(TabScreen):
 
     def compose_body(self) -> ComposeResult:
         """The parts of this screen."""
-        yield TextPanel(id="history-header", classes="table-header")
-        yield RowList(id="runs")
-        yield TextPanel("Comparison", classes="title")
-        yield TextList(id="comparison")
+        yield widgets.TextPanel(id="history-header", classes="table-header")
+        yield widgets.RowList(id="runs")
+        yield widgets.TextPanel("Comparison", classes="title")
+        yield widgets.TextList(id="comparison")
 
     def draw(self, model: ScreenModel) -> None:
         """Show what is so now."""
@@ -185,7 +176,7 @@ class HistoryScreen(TabScreen):
 
     async def action_about(self, what: str) -> None:
         """Do something about the run that is chosen."""
-        if (run := self.query_one(RowList).chosen) is not None:
+        if (run := self.query_one(widgets.RowList).chosen) is not None:
             await self.run_action(f"app.perform({what!r}, {run!r})")
 
     async def action_write(self) -> None:

@@ -6,15 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from hexacell.campaign import feasibility
-from hexacell.campaign.decisions import (
-    CampaignState,
-    Finished,
-    FinishPoint,
-    Forecast,
-    MeasurePose,
-    StartPoint,
-)
+from hexacell.campaign import decisions, feasibility
 from hexacell.campaign.feasibility import unreachable_share
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import pose_list_of
@@ -45,8 +37,8 @@ class NextPose:
         left_out: records so far that the others prove false.
     """
 
-    decision: StartPoint | MeasurePose | Finished
-    forecast: Forecast | None
+    decision: decisions.StartPoint | decisions.MeasurePose | decisions.Finished
+    forecast: decisions.Forecast | None
     left_out: tuple[RecordId, ...] = ()
 
 
@@ -135,7 +127,7 @@ def next_pose(cell: Cell, measurements: MeasurementSet, *, rejections: int = 0) 
     _require(cell, plan, (one for one in stated if one[0][0] == "identification"))
     state = _state_of_records(plan, measurements, rejections)
     decision = _decide(plan, state)
-    forecast = decision.forecast if isinstance(decision, MeasurePose) else plan.forecast(state)
+    forecast = decision.forecast if isinstance(decision, decisions.MeasurePose) else plan.forecast(state)
     return NextPose(decision, forecast, tuple(sorted(plan.estimate(state).false_records)))
 
 
@@ -164,7 +156,7 @@ def plan_of(cell: Cell) -> Plan:
     return Plan(cell.settings, robot_of(cell), pose_list_of(cell), search_effort.EFFORT)
 
 
-def _state_of_records(plan: Plan, measurements: MeasurementSet, rejections: int) -> CampaignState:
+def _state_of_records(plan: Plan, measurements: MeasurementSet, rejections: int) -> decisions.CampaignState:
     """The state after the last record: the gauges are at its point, all other points are done."""
     for point in measurements.points.tolist():
         if point not in plan.points:
@@ -173,19 +165,21 @@ def _state_of_records(plan: Plan, measurements: MeasurementSet, rejections: int)
                 action="Take the measurement file and the cell file that belong together",
             )
     if not len(measurements):
-        return CampaignState(rejections=rejections)
+        return decisions.CampaignState(rejections=rejections)
     last = measurements.records[-1]
     others = frozenset(measurements.points.tolist()) - {last.point}
-    return CampaignState(measurements, last.point, others, last.pose, rejections)
+    return decisions.CampaignState(measurements, last.point, others, last.pose, rejections)
 
 
-def _decide(plan: Plan, state: CampaignState) -> StartPoint | MeasurePose | Finished:
+def _decide(
+    plan: Plan, state: decisions.CampaignState
+) -> decisions.StartPoint | decisions.MeasurePose | decisions.Finished:
     """What to measure now; where a point is done, at the next one."""
     decision = plan.decide(state)
-    if isinstance(decision, FinishPoint):
+    if isinstance(decision, decisions.FinishPoint):
         leaving = replace(state, point=None, done=state.done | {decision.point}, present=None, rejections=0)
         decision = plan.decide(leaving)
-    if isinstance(decision, FinishPoint):  # impossible: between points there is none to finish
+    if isinstance(decision, decisions.FinishPoint):  # impossible: between points there is none to finish
         raise TypeError(decision)
     return decision
 

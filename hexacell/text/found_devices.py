@@ -10,15 +10,8 @@ from drivers.discovery.encoders import BusFindings, FoundFrame, FoundNode
 from drivers.discovery.gauges import FoundGauge, PortFindings
 from drivers.serial.opening import SerialPortFound
 from hexacell.kinematics.parameters import LEGS, JointUnit
+from hexacell.services.devices import device_search
 from hexacell.services.devices.device_diagnosis import DeviceDiagnosis, Failure
-from hexacell.services.devices.device_search import (
-    SearchFindings,
-    encoder_keys,
-    found_bank,
-    found_gauges,
-    gauge_keys,
-    unknown_encoders,
-)
 from hexacell.text.layout import counted
 from hexacell.text.planning import device_line
 
@@ -26,12 +19,12 @@ AXES = "xyz"
 MOST_FRAMES = 12
 
 
-def search_document(found: SearchFindings) -> dict[str, Any]:
+def search_document(found: device_search.SearchFindings) -> dict[str, Any]:
     """All that was found, and ``cell``: the text for a cell file."""
     return asdict(found) | {"cell": "\n".join(cell_lines(found))}
 
 
-def search_lines(found: SearchFindings) -> Iterator[str]:
+def search_lines(found: device_search.SearchFindings) -> Iterator[str]:
     """What was found, in words."""
     if not found.ports:
         yield "No serial port: plug a gauge's cable or adapter in, or name a port."
@@ -50,13 +43,13 @@ def search_lines(found: SearchFindings) -> Iterator[str]:
         yield f"Controller at {found.controller.host}:{found.controller.port}: {found.controller.greeting}"
 
 
-def cell_lines(found: SearchFindings) -> Iterator[str]:
+def cell_lines(found: device_search.SearchFindings) -> Iterator[str]:
     """The sections of a cell file for what was found; the axes are guesses, as no device reports them."""
-    for axis, gauge in zip(AXES, found_gauges(found), strict=False):
+    for axis, gauge in zip(AXES, device_search.found_gauges(found), strict=False):
         yield from _gauge_section(axis, gauge)
-    if bank := found_bank(found):
+    if bank := device_search.found_bank(found):
         yield from _encoder_section(*bank)
-    elif (bus := unknown_encoders(found)) is not None:
+    elif (bus := device_search.unknown_encoders(found)) is not None:
         yield from _described_encoder_section(bus)
     if found.controller is not None:
         address = {"host": found.controller.host, "port": found.controller.port}
@@ -132,7 +125,7 @@ def _gauge_section(axis: str, gauge: FoundGauge) -> Iterator[str]:
     yield from _keys({"name": axis})
     yield f'axis = "{axis}"  # the base axis along which its plunger moves: press it, and correct this'
     yield "sign = 1    # -1 if it shows less when the ball moves along that axis"
-    yield from _keys({"protocol": gauge.protocol, "port": gauge.port, **gauge_keys(gauge)})
+    yield from _keys({"protocol": gauge.protocol, "port": gauge.port, **device_search.gauge_keys(gauge)})
     yield ""
 
 
@@ -142,7 +135,7 @@ def _encoder_section(bus: BusFindings, encoders: tuple[FoundNode, ...]) -> Itera
     yield from ("[encoders]", *_keys({"protocol": "cia406"}))
     yield f"bus = {{ {', '.join(_keys(bus.bus))} }}"
     yield f"nodes = {nodes}  # of legs 1 to 6{needed}"
-    yield from _keys(encoder_keys(encoders))
+    yield from _keys(device_search.encoder_keys(encoders))
     yield ""
 
 

@@ -18,16 +18,8 @@ from hexacell.text.measured_noise import measured_noise_text
 from hexacell.text.planning import quick_accuracy_text, run_forecast_line
 from hexacell.text.verdict import check_text, length_text, start_text, verification_text
 from procedures.journal.journal import Entry
+from procedures.run import questions
 from procedures.run.keys import Phase, SetKey
-from procedures.run.questions import (
-    PLACED,
-    GaugePlacement,
-    PendingChange,
-    Question,
-    StepFailure,
-    UnreadyController,
-    WrittenResult,
-)
 from procedures.run.state import RunState, apply
 from procedures.steps import events
 from procedures.steps.move import Move
@@ -85,31 +77,31 @@ class TypedAnswer:
     value: str | None
 
 
-def typed_answer(typed: str, question: Question, person: str) -> TypedAnswer | None:
+def typed_answer(typed: str, question: questions.Question, person: str) -> TypedAnswer | None:
     """The answer in a typed line, None if it is not one; ``person`` is who gives it."""
     line = typed.strip()
     match question.subject:
-        case GaugePlacement():
-            return None if line else TypedAnswer(PLACED)
-        case PendingChange() | WrittenResult():
+        case questions.GaugePlacement():
+            return None if line else TypedAnswer(questions.PLACED)
+        case questions.PendingChange() | questions.WrittenResult():
             answer, consent = line.lower(), question.consent.lower()
             if answer == consent or (consent == YES[0] and answer in YES):
                 return TypedAnswer(person)
             return TypedAnswer(None) if answer in NO else None
-        case StepFailure() | UnreadyController():
+        case questions.StepFailure() | questions.UnreadyController():
             answer = line.lower().replace(" ", "-")
             found = [choice for choice in question.choices if answer and choice.startswith(answer)]
             return TypedAnswer(found[0]) if len(found) == 1 else None
 
 
-def request_text(question: Question) -> str:
+def request_text(question: questions.Question) -> str:
     """What to type."""
     match question.subject:
-        case GaugePlacement():
+        case questions.GaugePlacement():
             return "Press Enter when they are in place, or type a to abort: "
-        case StepFailure():
+        case questions.StepFailure():
             return f"Type one of {', '.join(question.choices)}: "
-    if isinstance(question.subject, UnreadyController) or question.consent == YES[0]:
+    if isinstance(question.subject, questions.UnreadyController) or question.consent == YES[0]:
         return "Type yes or no: "
     return f"Type the cell's name, {question.consent}, to take the responsibility, or no: "
 

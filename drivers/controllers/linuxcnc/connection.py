@@ -9,16 +9,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, nullcontext, suppress
 from typing import Self
 
-from drivers.controllers.linuxcnc.protocol import (
-    LineBuffer,
-    Response,
-    Timeouts,
-    encode_command,
-    loop_time,
-    parse_explanation,
-    parse_response,
-    subject_of,
-)
+from drivers.controllers.linuxcnc import protocol
 from drivers.errors import ConnectionLost, ResponseTimeout
 from drivers.wire_trace import LineRecord, TraceRecorder, TrafficDirection
 from hexacell.cell.robot import ControllerSettings
@@ -103,19 +94,19 @@ class Connection:
     def __init__(
         self,
         settings: ControllerSettings,
-        timeouts: Timeouts,
+        timeouts: protocol.Timeouts,
         recorder: TraceRecorder | None,
         reader: asyncio.StreamReader,
         writer: asyncio.StreamWriter,
     ) -> None:
         self.server = ""
         self.send_turn: Callable[[], AbstractAsyncContextManager[None]] = nullcontext
-        self.settings, self.subject = settings, subject_of(settings)
+        self.settings, self.subject = settings, protocol.subject_of(settings)
         self._wire = LineRecord(self.subject, recorder)
         self._timeouts = timeouts
         self._reader = reader
         self._writer = writer
-        self._buffer = LineBuffer()
+        self._buffer = protocol.LineBuffer()
         self._lines: deque[str] = deque()
         self._outstanding: str | None = None
 
@@ -123,7 +114,7 @@ class Connection:
     async def open(
         cls,
         settings: ControllerSettings,
-        timeouts: Timeouts,
+        timeouts: protocol.Timeouts,
         recorder: TraceRecorder | None = None,
         *,
         commanding: bool = True,
@@ -146,14 +137,14 @@ class Connection:
         _log.info("%s: connected to %s", connection.subject, connection.server)
         return connection
 
-    async def request(self, command: str, timeout_s: float | None = None) -> Response:
+    async def request(self, command: str, timeout_s: float | None = None) -> protocol.Response:
         """Send one command; its response, a refusal included.
 
         Raises:
             ResponseTimeout: No response within ``timeout_s``.
             ConnectionLost: The connection broke.
         """
-        line = encode_command(command, self.subject)
+        line = protocol.encode_command(command, self.subject)
         async with self.send_turn():
             self._outstanding = command
             await self._write(line)
@@ -193,8 +184,8 @@ class Connection:
 
     async def _greet(self) -> None:
         password = self.settings.connect_password.get_secret_value()
-        await self._write(encode_command(f"hello {password} {_CLIENT}", self.subject))
-        deadline = loop_time() + self._timeouts.answer
+        await self._write(protocol.encode_command(f"hello {password} {_CLIENT}", self.subject))
+        deadline = protocol.loop_time() + self._timeouts.answer
         try:
             while (line := await self._line(deadline)).lower().startswith("warning:"):
                 pass
@@ -217,9 +208,9 @@ class Connection:
                 )
             case _:
                 raise self._not_linuxcncrsh(line)
-        await self._write(encode_command("set echo off", self.subject))
+        await self._write(protocol.encode_command("set echo off", self.subject))
         with suppress(TimeoutError):  # the only response, if any, is the echo
-            await self._line(loop_time() + self._timeouts.explanation)
+            await self._line(protocol.loop_time() + self._timeouts.explanation)
         await self.request("set verbose on")
 
     def _not_linuxcncrsh(self, said: str) -> DeviceError:
@@ -237,18 +228,18 @@ class Connection:
         except OSError as error:
             raise ConnectionLost("closed the connection", subject=self.subject) from error
 
-    async def _outstanding_response(self, command: str, timeout_s: float) -> Response:
-        deadline = loop_time() + timeout_s
+    async def _outstanding_response(self, command: str, timeout_s: float) -> protocol.Response:
+        deadline = protocol.loop_time() + timeout_s
         remarks: list[str] = []
         try:
-            while (answer := parse_response(line := await self._line(deadline), command)) is None:
-                if explanation := parse_explanation(line):
+            while (answer := protocol.parse_response(line := await self._line(deadline), command)) is None:
+                if explanation := protocol.parse_explanation(line):
                     remarks.append(explanation)
-                    deadline = min(deadline, loop_time() + self._timeouts.explanation)
+                    deadline = min(deadline, protocol.loop_time() + self._timeouts.explanation)
         except TimeoutError:
             if remarks:  # 2.10 refuses without a NAK while another client moves the machine
                 self._outstanding = None
-                return Response(accepted=False, explanations=tuple(remarks))
+                return protocol.Response(accepted=False, explanations=tuple(remarks))
             asked = " ".join(command.split()[:2])  # no passwords in messages
             _log.warning("%s: no answer to '%s' within %g s", self.subject, asked, timeout_s)
             raise ResponseTimeout(
@@ -257,7 +248,7 @@ class Connection:
                 action="Restart LinuxCNC, and find out why",
             ) from None
         self._outstanding = None
-        return Response(answer.accepted, answer.text, tuple(remarks))
+        return protocol.Response(answer.accepted, answer.text, tuple(remarks))
 
     async def _line(self, deadline: float) -> str:
         while not self._lines:
@@ -291,7 +282,7 @@ def without_passwords(data: bytes, settings: ControllerSettings) -> bytes:
 
 
 async def _connect(
-    settings: ControllerSettings, timeouts: Timeouts
+    settings: ControllerSettings, timeouts: protocol.Timeouts
 ) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
     start = "Start LinuxCNC with DISPLAY = linuxcncrsh --port N, or correct controller.host and .port"
     try:
@@ -299,9 +290,9 @@ async def _connect(
             return await asyncio.open_connection(settings.host, settings.port)
     except TimeoutError:
         problem = f"cannot be reached within {timeouts.connect:g} s"
-        raise ConnectionLost(problem, subject=subject_of(settings), action=start) from None
+        raise ConnectionLost(problem, subject=protocol.subject_of(settings), action=start) from None
     except OSError as error:
         number = error.errno or 0  # negative from getaddrinfo, which has its own text
         reason = os.strerror(number) if number > 0 else error.strerror
         problem = f"cannot be reached: {reason or error}"
-        raise ConnectionLost(problem, subject=subject_of(settings), action=start) from error
+        raise ConnectionLost(problem, subject=protocol.subject_of(settings), action=start) from error

@@ -5,27 +5,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import PurePath
 
-from drivers.controllers.linuxcnc import startup
+from drivers import errors
+from drivers.controllers.linuxcnc import protocol, startup
 from drivers.controllers.linuxcnc.commands import ControllerCommands
-from drivers.controllers.linuxcnc.protocol import (
-    Timeouts,
-    loop_time,
-    parse_pose_refusal,
-    pose_difference,
-    restoring_block,
-    subject_of,
-    timed_move,
-)
 from drivers.controllers.linuxcnc.session import Session
-from drivers.errors import (
-    CommandRefused,
-    ConnectionLost,
-    MotionInterrupted,
-    MoveRefused,
-    PoseRefused,
-    ResponseTimeout,
-    StartupNotPermitted,
-)
 from drivers.interfaces import (
     ControllerStatus,
     DeviceIdentity,
@@ -38,7 +21,7 @@ from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
 
-_TIMEOUTS = Timeouts()
+_TIMEOUTS = protocol.Timeouts()
 
 
 class LinuxcncrshController:
@@ -54,15 +37,15 @@ class LinuxcncrshController:
         settings: ControllerSettings,
         *,
         trace: TraceRecorder | None = None,
-        timeouts: Timeouts = _TIMEOUTS,
+        timeouts: protocol.Timeouts = _TIMEOUTS,
     ) -> None:
-        self._name = subject_of(settings)
+        self._name = protocol.subject_of(settings)
         self._settings = settings
         self._timeouts = timeouts
         self._session = Session(settings, timeouts, trace)
         self._order = asyncio.Lock()
         self._joints_before_reload: tuple[float, ...] | None = None
-        self._restoring = restoring_block("")
+        self._restoring = protocol.restoring_block("")
         self._has_changed_modes = False
         self._is_unready = False
 
@@ -108,7 +91,7 @@ class LinuxcncrshController:
                 await self._make_ready(commands, permitted, stops)
                 if self._has_changed_modes:
                     await self._restore_modes(commands)
-                self._restoring = restoring_block(await startup.check_coordinate_system(commands))
+                self._restoring = protocol.restoring_block(await startup.check_coordinate_system(commands))
 
     async def move(self, pose: Pose, duration_s: float) -> None:
         """Move to ``pose`` in inverse time; returns when the actual pose agrees with it.
@@ -124,9 +107,9 @@ class LinuxcncrshController:
         """
         stops = self._session.stop_count
         try:
-            block = timed_move(pose, duration_s)
+            block = protocol.timed_move(pose, duration_s)
         except ValueError as error:
-            raise MoveRefused(f"to move to {pose}", str(error), subject=self._name) from error
+            raise errors.MoveRefused(f"to move to {pose}", str(error), subject=self._name) from error
         limit_s = 2.0 * duration_s + self._timeouts.beyond_move
         async with self._order:
             commands = await self._session.synchronized()
@@ -134,12 +117,12 @@ class LinuxcncrshController:
                 raise self._stopped_before_moving()
             if self._is_unready:
                 reason, action = "its last preparation failed", "Prepare it again"
-                raise MoveRefused(f"to move to {pose}", reason, subject=self._name, action=action)
+                raise errors.MoveRefused(f"to move to {pose}", reason, subject=self._name, action=action)
             await self._execute(commands, block, pose, stops, limit_s)
             await self._verify_arrival(commands, pose, stops, limit_s)
             try:
                 await self._restore_modes(commands)
-            except CommandRefused:
+            except errors.CommandRefused:
                 if not self._was_stopped_since(stops):  # the stop took control: they are restored later
                     raise
 
@@ -216,7 +199,7 @@ class LinuxcncrshController:
             if action is StartupAction.RESET_ESTOP:
                 self._joints_before_reload = None  # somebody else switched it off
             if action not in permitted:
-                raise StartupNotPermitted(action, self._name)
+                raise errors.StartupNotPermitted(action, self._name)
             permitted -= {action}  # what is needed again was undone by somebody
             await self._start_up(commands, action, stops)
         self._session.was_enabled = True
@@ -245,16 +228,16 @@ class LinuxcncrshController:
         self._has_changed_modes = True
         try:
             await commands.set(f"mdi {block}", limit_s)
-        except CommandRefused as refusal:
+        except errors.CommandRefused as refusal:
             if self._was_stopped_since(stops):  # the stop took control before the move was received
                 raise self._stopped_before_moving() from refusal
             raise self._move_refusal(pose, refusal.reason, refusal.action) from refusal
-        except ResponseTimeout as overdue:
+        except errors.ResponseTimeout as overdue:
             await self.stop()
             problem = f"was still moving after {limit_s:g} s and was stopped"
             action = "Look for what slows it down: its feed override, or [speed] beyond what it can do"
-            raise MotionInterrupted(problem, subject=self._name, action=action) from overdue
-        except ConnectionLost:
+            raise errors.MotionInterrupted(problem, subject=self._name, action=action) from overdue
+        except errors.ConnectionLost:
             await self.stop()
             raise
         except asyncio.CancelledError:
@@ -262,31 +245,31 @@ class LinuxcncrshController:
                 await self.stop()
             raise
 
-    def _move_refusal(self, pose: Pose, reason: str, action: str | None) -> MoveRefused:
+    def _move_refusal(self, pose: Pose, reason: str, action: str | None) -> errors.MoveRefused:
         move = f"to move to {pose}"
-        if (found := parse_pose_refusal(reason)) is None:
-            return MoveRefused(move, reason, subject=self._name, action=action)
+        if (found := protocol.parse_pose_refusal(reason)) is None:
+            return errors.MoveRefused(move, reason, subject=self._name, action=action)
         axis, is_highest = found
-        return PoseRefused(move, reason, subject=self._name, axis=axis, is_highest=is_highest)
+        return errors.PoseRefused(move, reason, subject=self._name, axis=axis, is_highest=is_highest)
 
-    def _stopped_before_moving(self) -> MotionInterrupted:
-        return MotionInterrupted("was stopped before it moved", subject=self._name)
+    def _stopped_before_moving(self) -> errors.MotionInterrupted:
+        return errors.MotionInterrupted("was stopped before it moved", subject=self._name)
 
     async def _verify_arrival(
         self, commands: ControllerCommands, target: Pose, stops: int, limit_s: float
     ) -> None:
         """Wait until it is there; on a computer under load the move is acknowledged before its end."""
-        here, still_s = None, loop_time()
+        here, still_s = None, protocol.loop_time()
         last_s = still_s + limit_s
         while not self._agree(there := await commands.pose(), target):
             if here is None or not self._agree(there, here):
-                here, still_s = there, loop_time()
+                here, still_s = there, protocol.loop_time()
             was_stopped = self._was_stopped_since(stops)
-            if was_stopped or loop_time() > min(still_s + self._timeouts.arrival, last_s):
+            if was_stopped or protocol.loop_time() > min(still_s + self._timeouts.arrival, last_s):
                 reason = "it was stopped on request" if was_stopped else await commands.reason()
-                if not was_stopped and parse_pose_refusal(reason):  # acknowledged all the same
+                if not was_stopped and protocol.parse_pose_refusal(reason):  # acknowledged all the same
                     raise self._move_refusal(target, reason, None)
-                raise MotionInterrupted(
+                raise errors.MotionInterrupted(
                     f"stopped at {there} before reaching {target}: {reason}",
                     subject=self._name,
                     action="Find out why it stopped, then prepare it and measure this pose again",
@@ -294,7 +277,7 @@ class LinuxcncrshController:
             await asyncio.sleep(self._timeouts.poll)
 
     def _agree(self, one: Pose, other: Pose) -> bool:
-        position, angle = pose_difference(one, other)
+        position, angle = protocol.pose_difference(one, other)
         settings = self._settings
         return position <= settings.position_tolerance_mm and angle <= settings.angle_tolerance_deg
 

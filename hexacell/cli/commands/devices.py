@@ -14,13 +14,7 @@ from hexacell.errors import AnswerNeeded, ExitCode, FileError, UsageError
 from hexacell.services.devices.device_diagnosis import diagnose
 from hexacell.services.devices.device_search import SearchFindings, draft_of, search_devices
 from hexacell.storage.atomic_files import require_creatable
-from hexacell.text.found_devices import (
-    cell_lines,
-    diagnosis_document,
-    diagnosis_lines,
-    search_document,
-    search_lines,
-)
+from hexacell.text import found_devices
 from hexacell.text.layout import wrapped
 from hexacell.text.screens.first_questions import FirstCellAssistant
 
@@ -61,12 +55,12 @@ def _search(options: argparse.Namespace, console: Console) -> ExitCode:
     buses = [_bus(words) for words in options.can]
     address = _address(options.controller)
     found = asyncio.run(search_devices(options.ports, buses, options.bitrate, address))
-    console.document(search_document(found))
-    for line in search_lines(found):
+    console.document(found_devices.search_document(found))
+    for line in found_devices.search_lines(found):
         console.print(wrapped(line))
     if options.write is not None:
         return _write(found, options.write, console)
-    if text := "\n".join(cell_lines(found)):
+    if text := "\n".join(found_devices.cell_lines(found)):
         console.print(f"\nFor your cell file:\n\n{text}")
     return ExitCode.DONE
 
@@ -101,8 +95,8 @@ def _watch(options: argparse.Namespace, console: Console) -> ExitCode:
         raise UsageError("--diagnose wants the cell of the device", action="Add --cell CELL")
     cell = cell_at(options.cell, console)
     found = asyncio.run(diagnose(cell, options.diagnose, options.seconds))
-    console.document(diagnosis_document(found))
-    for line in diagnosis_lines(found):
+    console.document(found_devices.diagnosis_document(found))
+    for line in found_devices.diagnosis_lines(found):
         console.print(wrapped(line))
     return ExitCode.DONE if found.is_usable else ExitCode.HARDWARE
 

@@ -13,16 +13,9 @@ from hexacell.services.history.past_runs import compare_runs, parameter_trends, 
 from hexacell.services.history.retention import delete_runs, retention
 from hexacell.services.history.run_index import RunIndex
 from hexacell.services.write_back.config_history import config_history
+from hexacell.text import documents
 from hexacell.text.cells import fleet_history_document, fleet_history_text
 from hexacell.text.config_changes import config_history_text
-from hexacell.text.documents import (
-    comparison_document,
-    config_history_document,
-    drift_document,
-    history_document,
-    retention_document,
-    story_document,
-)
 from hexacell.text.history import comparison_text, drift_text, history_text, retention_text, watch_text
 from hexacell.text.line_face import story_text
 from procedures.journal.journal import read_entries
@@ -40,7 +33,7 @@ def main(options: argparse.Namespace) -> ExitCode:
     cell = cell_at(options.cell, console)
     if options.compare is not None:
         compared = compare_runs(cell, *options.compare)
-        console.show(comparison_document(*compared), comparison_text(*compared))
+        console.show(documents.comparison_document(*compared), comparison_text(*compared))
     elif options.show is not None:
         _show(find_run(cell, options.show), console)
     elif options.keep is not None:
@@ -51,12 +44,12 @@ def main(options: argparse.Namespace) -> ExitCode:
         index = _index(cell, options, console)
         found, watched = parameter_trends(cell, past_runs(cell, index), index), drift_history(cell, index)
         console.show(
-            drift_document(found, watched),
+            documents.drift_document(found, watched),
             "\n".join(filter(None, [watch_text(watched), drift_text(found)])),
         )
     else:
         runs = past_runs(cell, _index(cell, options, console))
-        console.show(history_document(runs), history_text(runs))
+        console.show(documents.history_document(runs), history_text(runs))
     return ExitCode.DONE
 
 
@@ -85,7 +78,7 @@ def _keep(cell: Cell, options: argparse.Namespace, console: Console) -> None:
     if options.delete:
         delete_runs(cell, found.leaving)
     console.show(
-        retention_document(found, is_deleted=options.delete),
+        documents.retention_document(found, is_deleted=options.delete),
         retention_text(found, is_deleted=options.delete),
     )
 
@@ -95,11 +88,11 @@ def _changes(cell: Cell, console: Console) -> None:
     found = config_history(cell)
     for line in found.damaged:
         console.warn(f"{found.path}, line {line}: this record is torn, damaged or newer, and left out")
-    console.show(config_history_document(found), config_history_text(found))
+    console.show(documents.config_history_document(found), config_history_text(found))
 
 
 def _show(run: RunFolder, console: Console) -> None:
     entries = read_entries(run.journal)
     if not entries:
         raise UsageError("nothing happened in this run", subject=run.path, action="Name another")
-    console.show(story_document(entries), story_text(entries))
+    console.show(documents.story_document(entries), story_text(entries))

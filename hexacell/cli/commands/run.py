@@ -21,12 +21,7 @@ from hexacell.services.recorded.resumption import run_to_resume
 from hexacell.services.run.calibration_run import RunRequest, calibrate, is_unverified
 from hexacell.services.run.demo import prepare_demo
 from hexacell.services.run.event_stream import EventStream
-from hexacell.services.schedule.unattended_runs import (
-    ended_in_time,
-    note_unreadable_cell,
-    raised_alarm,
-    repetition,
-)
+from hexacell.services.schedule import unattended_runs
 from hexacell.text.documents import run_document
 from hexacell.text.layout import wrapped
 from hexacell.text.line_face import LETTERS
@@ -91,7 +86,7 @@ def _cell(options: argparse.Namespace, console: Console, mode: Mode) -> Cell:
         return cell_with_devices_at(options.cell, console)
     except HexacellError as error:
         if options.unattended:
-            note_unreadable_cell(options.cell, mode.value, error)
+            unattended_runs.note_unreadable_cell(options.cell, mode.value, error)
         raise
 
 
@@ -123,13 +118,13 @@ def _run_and_repeat(request: RunRequest, console: Console, stream: EventStream |
         request, console, lambda: execute_run(request, console, _copied(request, stream))
     )
     state = fold(read_journal(request.folder.journal))
-    again = repetition(request, state)
+    again = unattended_runs.repetition(request, state)
     if again is None:
         return RunEnd(request, ended, state)
     console.print(REPEATED)
     ended = execute_run(again, console, _copied(again, stream))
     state = fold(read_journal(again.folder.journal))
-    console.print(REPEATED_ALARM if raised_alarm(state) else NOT_REPEATED_ALARM)
+    console.print(REPEATED_ALARM if unattended_runs.raised_alarm(state) else NOT_REPEATED_ALARM)
     return RunEnd(again, ended, state)
 
 
@@ -173,7 +168,7 @@ async def _calibrate(
 ) -> events.Ended:
     """Calibrate; a person at a terminal may also type commands."""
     if not isinstance(request.operator, TerminalOperator):
-        with ended_in_time(request, queue):
+        with unattended_runs.ended_in_time(request, queue):
             return await calibrate(request, [*further, progress], queue)
     watching = RunDeviceWatch(request.cell.settings.gauges)
     answers = RunAnswers(console, watching)

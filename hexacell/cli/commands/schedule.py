@@ -13,13 +13,8 @@ from hexacell.services.schedule.schedules import (
     scheduled_run,
     write_schedule,
 )
+from hexacell.text import operation
 from hexacell.text.documents import schedule_document
-from hexacell.text.operation import (
-    crontab_text,
-    present_schedule_text,
-    removed_schedule_text,
-    written_schedule_text,
-)
 
 
 def main(options: argparse.Namespace) -> ExitCode:
@@ -30,7 +25,7 @@ def main(options: argparse.Namespace) -> ExitCode:
         found = (present_schedule if options.show else remove_schedule)(cell, options.folder)
         console.show(
             schedule_document(found),
-            (present_schedule_text if options.show else removed_schedule_text)(found),
+            (operation.present_schedule_text if options.show else operation.removed_schedule_text)(found),
         )
     elif options.daily is None:
         raise UsageError("the time of day is missing", action="Give --daily 02:30, --show or --remove")
@@ -55,7 +50,7 @@ def _write(cell: Cell, options: argparse.Namespace, console: Console) -> None:
         if options.on_failure is not None:
             raise UsageError("only systemd starts a unit on a failure", action="Leave --on-failure away")
         line = crontab_line(run)
-        console.show({"crontab": line}, crontab_text(line, stated))
+        console.show({"crontab": line}, operation.crontab_text(line, stated))
         return
     written = write_schedule(run, options.folder)
-    console.show(schedule_document(written), written_schedule_text(written, run, stated))
+    console.show(schedule_document(written), operation.written_schedule_text(written, run, stated))

@@ -7,22 +7,8 @@ from datetime import date
 from drivers.interfaces import DeviceIdentity
 from hexacell.services.history.reported_run import ReportedRun
 from hexacell.text.measured_noise import measured_noise_sentences
+from hexacell.text.report import results, statement
 from hexacell.text.report.pages import Chapter, Facts, Paragraph, Report, Table, Tone
-from hexacell.text.report.results import (
-    comparison_chapter,
-    figure_chapter,
-    observability_chapter,
-    parameter_chapter,
-    uncertainty_chapter,
-)
-from hexacell.text.report.statement import (
-    NO_VERDICT,
-    TONES,
-    found_and_left_chapter,
-    method_chapter,
-    statement_chapter,
-    verdict_of,
-)
 
 TITLES = {
     "optimise": "Calibration report",
@@ -40,16 +26,16 @@ def report_of(run: ReportedRun, earlier: ReportedRun | None = None) -> Report:
     Raises:
         UsageError: the two cannot be compared.
     """
-    verdict = verdict_of(run)
+    verdict = statement.verdict_of(run)
     chapters = (
-        statement_chapter(run),
-        found_and_left_chapter(run),
-        method_chapter(run),
-        figure_chapter(run),
-        uncertainty_chapter(run),
-        parameter_chapter(run),
-        None if earlier is None else comparison_chapter(earlier, run),
-        observability_chapter(run),
+        statement.statement_chapter(run),
+        statement.found_and_left_chapter(run),
+        statement.method_chapter(run),
+        results.figure_chapter(run),
+        results.uncertainty_chapter(run),
+        results.parameter_chapter(run),
+        None if earlier is None else results.comparison_chapter(earlier, run),
+        results.observability_chapter(run),
         conditions_chapter(run),
         traceability_chapter(run),
         integrity_chapter(run),
@@ -59,8 +45,8 @@ def report_of(run: ReportedRun, earlier: ReportedRun | None = None) -> Report:
         title=TITLES[run.started.mode],
         identifier=run.identifier,
         issued=run.ended.date(),
-        verdict=NO_VERDICT if verdict is None else verdict.value.upper(),
-        tone=Tone.OPEN if verdict is None else TONES.get(verdict, Tone.OPEN),
+        verdict=statement.NO_VERDICT if verdict is None else verdict.value.upper(),
+        tone=Tone.OPEN if verdict is None else statement.TONES.get(verdict, Tone.OPEN),
         chapters=tuple(chapter for chapter in chapters if chapter is not None),
     )
 

@@ -6,17 +6,7 @@ from hexacell.run_process.messages import LiveSnapshot
 from hexacell.text.screens.views import Choice, QuestionView, Urgency
 from hexacell.text.verdict import gate_lines, improvement_sentence, teaching_sentence
 from hexacell.verdict.acceptance_gates import AcceptanceGate
-from procedures.run.questions import (
-    NO,
-    PLACED,
-    YES,
-    GaugePlacement,
-    PendingChange,
-    Question,
-    StepFailure,
-    UnreadyController,
-    WrittenResult,
-)
+from procedures.run import questions
 
 PERSON = "a person at the screen"
 """Who approves a change, as the journal has it."""
@@ -29,17 +19,17 @@ RECOVERIES = {
 }
 
 
-def question_view(question: Question, live: LiveSnapshot | None) -> QuestionView:
+def question_view(question: questions.Question, live: LiveSnapshot | None) -> QuestionView:
     """A question with what is to be known for it."""
     match question.subject:
-        case GaugePlacement() as place:
+        case questions.GaugePlacement() as place:
             return _placement(place, live)
-        case PendingChange(gates=gates, diff=diff, displacement=moved, improvement=improvement):
+        case questions.PendingChange(gates=gates, diff=diff, displacement=moved, improvement=improvement):
             facts = (gate_lines(gates), improvement_sentence(improvement), teaching_sentence(moved))
             view = _consenting(question, "write it", "Write the new geometry into the controller's config?")
             change, refusal = f"The change:\n{diff.rstrip()}", approval_refusal(gates)
             return replace(view, paragraphs=tuple(filter(None, facts)), change=change, refusal=refusal)
-        case WrittenResult(line=line, displacement=moved):
+        case questions.WrittenResult(line=line, displacement=moved):
             title, otherwise = "The result did not pass. Keep it all the same?", "restore the old config"
             view = _consenting(question, "keep it", title, otherwise)
             stands = (
@@ -47,7 +37,7 @@ def question_view(question: Question, live: LiveSnapshot | None) -> QuestionView
             )
             shown = tuple(filter(None, (f"{line}.", teaching_sentence(moved), stands)))
             return replace(view, paragraphs=shown, urgency=Urgency.ALARM)
-        case StepFailure(problem=problem):
+        case questions.StepFailure(problem=problem):
             choices = (
                 Choice(str(number), f"{choice}: {RECOVERIES.get(choice, 'do that')}", choice)
                 for number, choice in enumerate(question.choices, start=1)
@@ -60,16 +50,19 @@ def question_view(question: Question, live: LiveSnapshot | None) -> QuestionView
                 shows_gauges=True,
                 urgency=Urgency.ALARM,
             )
-        case UnreadyController(problem=problem, request=request):
+        case questions.UnreadyController(problem=problem, request=request):
             return QuestionView(
                 title="The controller is not ready",
                 paragraphs=(f"{problem}.", request),
                 instruction="Press y or n.",
-                choices=(Choice("y", "yes", YES, is_consent=True), Choice("n", "no", NO)),
+                choices=(
+                    Choice("y", "yes", questions.YES, is_consent=True),
+                    Choice("n", "no", questions.NO),
+                ),
             )
 
 
-def _placement(place: GaugePlacement, live: LiveSnapshot | None) -> QuestionView:
+def _placement(place: questions.GaugePlacement, live: LiveSnapshot | None) -> QuestionView:
     where = f"The robot holds the ball at {place.pose}."
     if place.seat is None:
         title = f"Put the gauges around the ball at {place.station}"
@@ -91,7 +84,7 @@ def _placement(place: GaugePlacement, live: LiveSnapshot | None) -> QuestionView
         title=title,
         paragraphs=(where, *all_sides, how),
         instruction="Press Enter when all gauges say ok.",
-        choices=(Choice("enter", "they are in place: measure", PLACED, is_consent=True),),
+        choices=(Choice("enter", "they are in place: measure", questions.PLACED, is_consent=True),),
         shows_gauges=True,
     )
 
@@ -103,7 +96,7 @@ def approval_refusal(gates: tuple[AcceptanceGate, ...]) -> str:
 
 
 def _consenting(
-    question: Question, what: str, title: str, otherwise: str = "leave the config as it is"
+    question: questions.Question, what: str, title: str, otherwise: str = "leave the config as it is"
 ) -> QuestionView:
     """A question of consent: by one key, or by the cell's name where it is grave."""
     decline = Choice("n", f"no, {otherwise}", None)

@@ -5,18 +5,7 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 
 from hexacell.campaign.decisions import Forecast
-from hexacell.run_process.messages import (
-    ControlChanged,
-    CursorMoved,
-    EventRecorded,
-    HostFailed,
-    HostMessage,
-    LiveSnapshot,
-    QuestionClosed,
-    QuestionOpened,
-    RunDescribed,
-    StatusChanged,
-)
+from hexacell.run_process import messages
 from hexacell.text.screens.views import Urgency
 from procedures.engine.command_loop import Status
 from procedures.run.keys import Phase, SetKey
@@ -26,7 +15,7 @@ from procedures.steps import events
 from procedures.steps.move import Expectation, Move
 from procedures.steps.registry import Step
 
-Setback = events.Tripped | events.Failed | events.Interrupted | HostFailed
+Setback = events.Tripped | events.Failed | events.Interrupted | messages.HostFailed
 """What a fault is shown from."""
 
 
@@ -53,14 +42,14 @@ class RunPicture:
         record_times: when records were taken, for the time that is left.
     """
 
-    described: RunDescribed | None = None
+    described: messages.RunDescribed | None = None
     state: RunState = field(default_factory=RunState)
     status: Status = Status.IDLE
     question: Question | None = None
-    live: LiveSnapshot | None = None
+    live: messages.LiveSnapshot | None = None
     live_at_s: float = 0.0
-    control: ControlChanged | None = None
-    cursor: CursorMoved | None = None
+    control: messages.ControlChanged | None = None
+    cursor: messages.CursorMoved | None = None
     step: Step | None = None
     last: events.Event | None = None
     expected: Mapping[tuple[SetKey, int], Expectation] = field(default_factory=dict)
@@ -90,33 +79,33 @@ class RunPicture:
 
 
 def picture_after(  # noqa: PLR0911 - a case a message
-    picture: RunPicture, message: HostMessage, now_s: float
+    picture: RunPicture, message: messages.HostMessage, now_s: float
 ) -> RunPicture:
     """The picture after one more message, which came at ``now_s`` by the screen's clock."""
     match message:
-        case RunDescribed():
+        case messages.RunDescribed():
             return RunPicture(described=message, control=picture.control)
-        case EventRecorded():
+        case messages.EventRecorded():
             return _with_event(picture, message)
-        case StatusChanged(status=status):
+        case messages.StatusChanged(status=status):
             return replace(picture, status=status)
-        case QuestionOpened(question=question):
+        case messages.QuestionOpened(question=question):
             return replace(picture, question=question)
-        case QuestionClosed():
+        case messages.QuestionClosed():
             return replace(picture, question=None)
-        case LiveSnapshot():
+        case messages.LiveSnapshot():
             return replace(picture, live=message, live_at_s=now_s)
-        case ControlChanged():
+        case messages.ControlChanged():
             return replace(picture, control=message)
-        case CursorMoved():
+        case messages.CursorMoved():
             return replace(picture, cursor=message)
-        case HostFailed():
+        case messages.HostFailed():
             # The journal has already said how a run ended.
             is_known = isinstance(picture.setback, events.Interrupted) and message.exit_code is not None
             return picture if is_known else _with_setback(picture, message)
 
 
-def _with_event(picture: RunPicture, message: EventRecorded) -> RunPicture:
+def _with_event(picture: RunPicture, message: messages.EventRecorded) -> RunPicture:
     event = message.event
     picture = replace(picture, state=apply(picture.state, event), last=event, refusal=None)
     match event:

@@ -50,6 +50,11 @@ class HexacellError(Exception):
         text = f"{where}: {self.problem}" if where else self.problem
         return text if self.action is None else f"{text}. {self.action}"
 
+    @property
+    def cause(self) -> str:
+        """The sentence without the next thing to do."""
+        return str(self).removesuffix(f". {self.action}") if self.action else str(self)
+
 
 class UsageError(HexacellError):
     """The command asks for something that cannot be done."""

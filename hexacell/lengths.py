@@ -6,6 +6,8 @@ where they would be shown as zero. Files and documents for other programs are in
 
 from dataclasses import dataclass
 
+MM_PER_METRE = 1000.0
+
 SMALLEST_MM = 0.01
 """Lengths of which the largest is smaller than this are shown in um."""
 

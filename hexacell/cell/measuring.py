@@ -73,27 +73,19 @@ class IdentificationSettings(Section):
     provisional: bool = key(
         False, "whether a better geometry is written to the controller after the first point"
     )
-    identify: tuple[Literal["all", "zeros"], ...] = key(
-        ("all",), '["zeros"]: the encoders\' zeros alone; all else stays as the controller has it'
+    identify: Literal["all", "zeros"] = key(
+        "all", '"zeros": the encoders\' zeros alone; all else stays as the controller has it'
     )
 
     @field_validator("identify", mode="before")
     @classmethod
-    def _one_word_is_a_list(cls, given: object) -> object:
-        if isinstance(given, str):
-            return (given,)
-        return tuple(given) if isinstance(given, list) else given
+    def _a_list_has_one_word(cls, given: object) -> object:
+        return given[0] if isinstance(given, list) and len(given) == 1 else given
 
     @property
     def only_zeros(self) -> bool:
         """Whether the encoders' zeros alone are identified."""
-        return self.identify == ("zeros",)
-
-    @model_validator(mode="after")
-    def _one_choice(self) -> Self:
-        if len(self.identify) != 1:
-            raise broken_rule("identify is one of all and zeros", 'Write ["zeros"], or remove it')
-        return self
+        return self.identify == "zeros"
 
     @model_validator(mode="after")
     def _zeros_alone_are_not_written_provisionally(self) -> Self:

@@ -9,7 +9,7 @@ import asyncio
 from socket import socket
 
 from hexacell.campaign.pose_list import pose_list_of
-from hexacell.errors import ExitCode, HexacellError, SeveralErrors
+from hexacell.errors import ExitCode, HexacellError
 from hexacell.run_process import messages
 from hexacell.run_process.audience import STUCK_S, Audience, audience_server
 from hexacell.run_process.live_devices import RunDeviceWatch
@@ -228,8 +228,6 @@ class RunHost:
 
 def failure_message(error: HexacellError) -> messages.HostFailed:
     """An error that ends a run, as a message."""
-    if isinstance(error, SeveralErrors):
-        return messages.HostFailed(problem=str(error), exit_code=int(error.exit_code))
-    plain = HexacellError(error.problem, subject=error.subject, line=error.line)
-    text = str(plain) if type(error).__str__ is HexacellError.__str__ else str(error)
-    return messages.HostFailed(problem=text, action=error.action or "", exit_code=int(error.exit_code))
+    return messages.HostFailed(
+        problem=error.cause, action=error.action or "", exit_code=int(error.exit_code)
+    )

@@ -51,7 +51,11 @@ def _assistant(path: Path) -> FirstCellAssistant:
 
 
 class TechnicianApp(App[int]):
-    """Loads its model behind the first screen and draws what that knows ten times a second."""
+    """Loads its model behind the first screen and draws what that knows ten times a second.
+
+    Attributes:
+        model: what is shown; None while it loads.
+    """
 
     TITLE = "hexacell"
     CSS_PATH = "styles.tcss"
@@ -70,7 +74,7 @@ class TechnicianApp(App[int]):
         self.preferences = preferences or ScreenPreferences()
         self.keys_in_use = {str(one.id): one.key_display or one.key for one in KEYS} | self.preferences.keys
         self._load, self._first_cell = load, first_cell
-        self._model: ScreenModel | None = None
+        self.model: ScreenModel | None = None
         self._question_seen, self._fault_seen, self._runs_seen = 0, 0, 0
         super().__init__()
         for theme in SCREEN_THEMES:
@@ -79,11 +83,6 @@ class TechnicianApp(App[int]):
             self.add_mode(screen.TAB, partial(screen, self.keys_in_use))
         self.theme = self.preferences.theme
         self.set_keymap(self.preferences.keys)
-
-    @property
-    def model(self) -> ScreenModel | None:
-        """What is shown; None while it loads."""
-        return self._model
 
     def delay_update(self, delay: float = SHOWN_AFTER_S) -> None:
         """Draw nothing while a screen takes another one's place: Textual waits until one could be made."""
@@ -102,11 +101,11 @@ class TechnicianApp(App[int]):
             if not await self._has_cell():
                 self.exit(0)
                 return
-            self._model = await asyncio.to_thread(self._load)
+            self.model = await asyncio.to_thread(self._load)
             self.draw()
             self.set_interval(DRAWN_EVERY_S, self.draw)
             self.run_worker(self._make_screens(), exit_on_error=False, group="make")
-            await self._model.attend()
+            await self.model.attend()
         except HexacellError as error:
             self._show_error(error)
 
@@ -128,18 +127,18 @@ class TechnicianApp(App[int]):
 
     def draw(self) -> None:
         """Show what is so now in the screen in front, and in what lies below it."""
-        if self._model is None or not self.screen_stack:  # it is loading, or being closed
+        if self.model is None or not self.screen_stack:  # it is loading, or being closed
             return
         for screen in self.screen_stack:
             if isinstance(screen, tabs.TabScreen | DigitsScreen | PlanScreen | overlays.QuestionOverlay):
                 with suppress(NoMatches):  # it is being composed, or taken away
-                    screen.draw(self._model)
-        if self._model.runs_followed != self._runs_seen:  # a new run is shown; overlays come after that
-            self._runs_seen = self._model.runs_followed
+                    screen.draw(self.model)
+        if self.model.run.runs != self._runs_seen:  # a new run is shown; overlays come after that
+            self._runs_seen = self.model.run.runs
             self.action_show("measure")
         elif self._is_whole:
-            self._overlay_question(self._model)
-            view, number = self._model.fault(), self._model.fault_number
+            self._overlay_question(self.model)
+            view, number = self.model.fault(), self.model.fault_number
             if view is not None and number != self._fault_seen:
                 self.push_screen(overlays.FaultOverlay(view))
             self._fault_seen = number
@@ -153,7 +152,7 @@ class TechnicianApp(App[int]):
 
     def _overlay_question(self, model: ScreenModel) -> None:
         """Show a new question; take away one that was answered."""
-        number, view = model.question_number, model.question()
+        number, view = model.run.questions, model.question()
         shown = next((one for one in self.screen_stack if isinstance(one, overlays.QuestionOverlay)), None)
         if shown is not None and (view is None or shown.number != number) and shown.is_current:
             shown.dismiss()
@@ -162,8 +161,8 @@ class TechnicianApp(App[int]):
             self.push_screen(overlays.QuestionOverlay(view, number, self._answer))
 
     async def _answer(self, value: str | None) -> None:
-        if self._model is not None:
-            self._start(self._model.answer(value))
+        if self.model is not None:
+            self._start(self.model.answer(value))
 
     def _start(self, work: Coroutine[Any, Any, str | None]) -> None:
         """Do something without waiting for it, so that the next key is heard at once."""
@@ -179,14 +178,15 @@ class TechnicianApp(App[int]):
 
     def _show_error(self, error: HexacellError) -> None:
         """Show an error that a person can act on."""
-        cause = str(error).removesuffix(f". {error.action}") if error.action else str(error)
-        self.push_screen(overlays.FaultOverlay(FaultView("That did not work", cause, error.action or "")))
+        self.push_screen(
+            overlays.FaultOverlay(FaultView("That did not work", error.cause, error.action or ""))
+        )
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Whether a key has an effect now."""
-        if action != "perform" or not parameters or self._model is None:
+        if action != "perform" or not parameters or self.model is None:
             return True
-        return True if self._model.allows(ScreenAction(str(parameters[0]))) else None
+        return True if self.model.allows(ScreenAction(str(parameters[0]))) else None
 
     def action_show(self, tab: str) -> None:
         """Go to another screen."""
@@ -195,8 +195,8 @@ class TechnicianApp(App[int]):
 
     def action_perform(self, action: str, argument: str = "") -> None:
         """Ask for something."""
-        if self._model is not None:
-            self._start(self._confirmed(self._model, ScreenAction(action), argument))
+        if self.model is not None:
+            self._start(self._confirmed(self.model, ScreenAction(action), argument))
 
     async def _confirmed(self, model: ScreenModel, action: ScreenAction, argument: str) -> str:
         """Do something, once a person has confirmed it where that is needed."""
@@ -208,7 +208,7 @@ class TechnicianApp(App[int]):
     def action_answer(self) -> None:
         """Show the open question again, or ask whether to write what the run in front has proposed."""
         self._question_seen = 0
-        model = self._model
+        model = self.model
         if model is not None and model.question() is None and model.proposing_run:
             self.action_perform("apply", model.proposing_run)
 
@@ -218,7 +218,7 @@ class TechnicianApp(App[int]):
 
     def action_plan(self) -> None:
         """Show the poses of the plan; it is tried first where it was not yet."""
-        if self._model is not None:
+        if self.model is not None:
             self.push_screen(PlanScreen())
             self.action_perform("preview", ONCE)
 
@@ -232,7 +232,7 @@ class TechnicianApp(App[int]):
 
     def action_leave(self) -> None:
         """Quit; while a run goes on, ask what becomes of it."""
-        if self._model is not None and self._model.may_leave_run:
+        if self.model is not None and self.model.may_leave_run:
             self.push_screen(overlays.QuitOverlay(), self._leave)
         else:
             self._leave("leave")
@@ -253,10 +253,10 @@ class TechnicianApp(App[int]):
             self.run_worker(self._quit(keep_running=leaving == "leave"), exit_on_error=False)
 
     async def _quit(self, *, keep_running: bool) -> None:
-        if self._model is not None:
+        if self.model is not None:
             with suppress(HexacellError, TimeoutError):
                 async with asyncio.timeout(LEAVING_TAKES_S):
-                    await self._model.leave(keep_running=keep_running)
+                    await self.model.leave(keep_running=keep_running)
         self.exit(0)
 
     def get_system_commands(self, screen: Screen[Any]) -> Iterable[SystemCommand]:  # noqa: ARG002 - the same everywhere

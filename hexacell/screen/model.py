@@ -41,12 +41,13 @@ class ScreenModel:
     Everything that is awaited raises ``HexacellError``.
 
     Attributes:
+        run: the run that is followed, live or recorded.
         runs: the runs of the cell, the latest first; None until they are read.
     """
 
     def __init__(self, workplace: Workplace, now: Callable[[], float] = time.monotonic) -> None:
         self._workplace, self._now = workplace, now
-        self._run = RunFollower(now, self._after_run)
+        self.run = RunFollower(now, self._after_run)
         self._devices = DeviceWatcher(workplace.watch, now)
         self._run_is_over = asyncio.Event()
         self._is_checking, self._is_starting, self._is_ready = False, False, False
@@ -84,13 +85,13 @@ class ScreenModel:
             if running is None:
                 self._devices.start()
             else:
-                await self._run.follow(running)
+                await self.run.follow(running)
             while True:
                 await self._read_history()
                 await self._run_is_over.wait()
                 self._run_is_over.clear()
         finally:
-            await self._run.stop()
+            await self.run.stop()
             await self._devices.stop()
 
     def _after_run(self) -> None:
@@ -101,29 +102,19 @@ class ScreenModel:
     # Views.
 
     @property
-    def question_number(self) -> int:
-        """Number of questions so far, so that none is taken for another."""
-        return self._run.questions
-
-    @property
     def fault_number(self) -> int:
         """A number that changes with every fault."""
-        return 1000 * self._run.runs + self._run.picture.setbacks
-
-    @property
-    def runs_followed(self) -> int:
-        """Number of runs that were shown so far."""
-        return self._run.runs
+        return 1000 * self.run.runs + self.run.picture.setbacks
 
     @property
     def may_leave_run(self) -> bool:
         """Whether a run goes on that can be stopped or left."""
-        return self._is_running and self._run.picture.may_command
+        return self._is_running and self.run.picture.may_command
 
     @property
     def proposing_run(self) -> str:
         """The recorded run in front, if its proposal can be applied; else empty."""
-        described = self._run.picture.described
+        described = self.run.picture.described
         if described is None or not described.is_recorded:
             return ""
         name = described.folder.name
@@ -133,21 +124,21 @@ class ScreenModel:
     @property
     def _recording(self) -> RecordedRun | None:
         """The recorded run that is shown; None if a run goes on, or nothing is shown."""
-        connection = self._run.connection
+        connection = self.run.connection
         return connection if isinstance(connection, RecordedRun) else None
 
     @property
     def _is_running(self) -> bool:
         """Whether a run goes on that has the devices."""
-        return self._run.connection is not None and self._recording is None
+        return self.run.connection is not None and self._recording is None
 
     def header(self) -> tuple[str, str, Urgency]:
         """The first line of every screen."""
-        return header_line(self._workplace.cell.settings.name, self._run.picture)
+        return header_line(self._workplace.cell.settings.name, self.run.picture)
 
     def shown(self, screen: str) -> dict[str, tuple[Any, ...]]:
         """What the parts of a screen show now, by their names: what each ``show`` is called with."""
-        cell, picture = self._workplace.cell, self._run.picture
+        cell, picture = self._workplace.cell, self.run.picture
         tried, is_trying = self._tried or TriedPlan(), self._trial is not None
         match screen:
             case "cell":
@@ -199,7 +190,7 @@ class ScreenModel:
 
     def _live(self) -> tuple[LiveSnapshot | None, float]:
         """What the devices showed last, and how long ago, s."""
-        picture, watched = self._run.picture, self._devices
+        picture, watched = self.run.picture, self._devices
         if self._is_running:
             return picture.live, self._now() - picture.live_at_s
         return watched.live, self._now() - watched.live_at_s
@@ -209,8 +200,8 @@ class ScreenModel:
 
         Where no run has begun, these are the devices of the cell.
         """
-        picture = self._run.picture
-        if self._run.connection is None and self._devices.live is not None:
+        picture = self.run.picture
+        if self.run.connection is None and self._devices.live is not None:
             return (*self._live(), None)
         zero = None if picture.at is None else picture.state.zero_shown(picture.at)
         return picture.live, self._now() - picture.live_at_s, zero
@@ -233,12 +224,12 @@ class ScreenModel:
         snapshot, _, zero = self._measured()
         gauges = () if snapshot is None else snapshot.gauges
         figures = [(live.gauge_figure(one, zero), live.urgency_of(one.problem)) for one in gauges]
-        records = sum(len(measured.samples) for measured in self._run.picture.state.sets.values())
-        return guidance(self._run.picture, self._workplace.cell.settings)["Now"], figures, records
+        records = sum(len(measured.samples) for measured in self.run.picture.state.sets.values())
+        return guidance(self.run.picture, self._workplace.cell.settings)["Now"], figures, records
 
     def _result(self) -> dict[str, tuple[Any, ...]]:
         """The parts of the result; made again where something has changed beside the live values."""
-        picture, may_write = self._run.picture, bool(self.proposing_run)
+        picture, may_write = self.run.picture, bool(self.proposing_run)
         seen = (picture.state, picture.question, may_write)
         if self._reviewed is None or not all(map(is_, self._reviewed[0], seen)):
             texts = reviewing.review_texts(picture, self._workplace.cell.settings, may_write=may_write)
@@ -250,14 +241,14 @@ class ScreenModel:
 
     def question(self) -> QuestionView | None:
         """The question that waits, if one does and may be answered here."""
-        picture = self._run.picture
+        picture = self.run.picture
         if picture.question is None or not picture.may_command:
             return None
         return question_view(picture.question, picture.live)
 
     def fault(self) -> FaultView | None:
         """The latest fault; those of a recorded run are long past."""
-        picture = self._run.picture
+        picture = self.run.picture
         return None if picture.setback is None or picture.is_recorded else fault_view(picture.setback)
 
     # Actions.
@@ -267,12 +258,12 @@ class ScreenModel:
         asked = ScreenAction
         match action:
             case asked.PAUSE | asked.PAUSE_AT_ONCE | asked.UNDO | asked.MEASURE_AGAIN | asked.ABORT:
-                is_over = self._run.picture.status is Status.ENDED
-                return self._is_running and self._run.picture.may_command and not is_over
+                is_over = self.run.picture.status is Status.ENDED
+                return self._is_running and self.run.picture.may_command and not is_over
             case asked.STEP | asked.PLAY:
                 return self._recording is not None
             case asked.TAKE_CONTROL:
-                return self._is_running and not self._run.picture.may_command
+                return self._is_running and not self.run.picture.may_command
             case asked.CHECK | asked.START | asked.EXCLUDE | asked.ROLL_BACK | asked.APPLY:
                 return not (self._is_running or self._is_checking or self._is_starting)
             case _:
@@ -297,29 +288,29 @@ class ScreenModel:
 
     async def answer(self, value: str | None) -> None:
         """Answer the question."""
-        await self._run.give(Answer(value))
+        await self.run.give(Answer(value))
 
     async def leave(self, *, keep_running: bool) -> None:
         """Let the run go on alone, or have it stopped."""
         if self._is_running:
-            await self._run.leave(keep_running=keep_running)
+            await self.run.leave(keep_running=keep_running)
 
     async def _give(self, command: Command, _: str = "") -> None:
-        await self._run.give(command)
+        await self.run.give(command)
 
     async def _pause(self, _: str) -> None:
-        is_paused = self._run.picture.status in {Status.PAUSED, Status.PAUSING}
+        is_paused = self.run.picture.status in {Status.PAUSED, Status.PAUSING}
         await self._give(Resume() if is_paused else Pause())
 
     async def _measure_again(self, _: str) -> None:
-        at = self._run.picture.at
+        at = self.run.picture.at
         if at is None:
             raise UsageError("no point is being measured now")
         await self._give(MeasureAgain(at))
 
     async def _take_control(self, _: str) -> None:
-        if self._run.connection is not None:
-            await self._run.connection.take_control()
+        if self.run.connection is not None:
+            await self.run.connection.take_control()
 
     async def _check(self, what: str) -> None:
         self._checked, self._is_ready, self._is_checking = None, False, True
@@ -338,7 +329,7 @@ class ScreenModel:
         await self._devices.stop()
         self._is_starting = True
         try:
-            await self._run.follow(await self._workplace.start(what))
+            await self.run.follow(await self._workplace.start(what))
         except BaseException:
             self._devices.start()
             raise
@@ -381,7 +372,7 @@ class ScreenModel:
         return RELOAD if RELOAD in " ".join(self._compared) else self._compared[-1]
 
     async def _open(self, run: str) -> None:
-        await self._run.follow(await self._workplace.open_run(run))
+        await self.run.follow(await self._workplace.open_run(run))
 
     async def _read_history(self) -> None:
         """Read which runs there are; where that fails, the history says why."""
@@ -401,7 +392,7 @@ class ScreenModel:
 
     async def _play(self, argument: str) -> None:
         """Halt or go on; ``+`` faster, ``-`` slower."""
-        cursor = self._run.picture.cursor
+        cursor = self.run.picture.cursor
         speed = 0.0 if cursor is None else cursor.speed
         place = SPEEDS.index(speed) if speed in SPEEDS else 0
         wanted = {"+": place + 1, "-": place - 1}.get(argument, 0 if place else 1)

@@ -26,11 +26,11 @@ from hexacell.kinematics.parameters import LEGS, MachinePart, ParameterUnit
 from hexacell.kinematics.pose import AXES, Pose, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask, from_angles
 from hexacell.kinematics.sensitivity import has_singularity_margin, singularity_margin
+from hexacell.lengths import MM_PER_METRE
 from hexacell.robot.model import Robot, controller_geometry, make_robot, robot_of
 from hexacell.robot.pose_limits import broken_limits
 from hexacell.robot.same_robot import reordered
 from hexacell.services.other_units import (
-    MM_PER_METRE,
     MOST,
     asked_of_limits,
     limit_in_other_unit,
@@ -257,10 +257,11 @@ def _cause_of_singularity(legs: Legs) -> str:
 
 def _similarity(base: Array, platform: Array) -> float:
     """How far joints (6, 3) are from the other part's once these are moved and scaled, as a share."""
+    from scipy.linalg import orthogonal_procrustes  # noqa: PLC0415 - only of a design that is singular
+
     one, other = (part - part.mean(axis=0) for part in (base, platform))
-    scale = np.linalg.norm(other) / np.linalg.norm(one)
-    u, _, v = np.linalg.svd(scale * one.T @ other)
-    return float(np.abs(scale * one @ u @ v - other).max() / np.abs(other).max())
+    one *= np.linalg.norm(other) / np.linalg.norm(one)
+    return float(np.abs(one @ orthogonal_procrustes(one, other)[0] - other).max() / np.abs(other).max())
 
 
 def _out_of_reach(cell: Cell, robot: Robot, commands: PoseBatch) -> FileError:

@@ -16,13 +16,14 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import JointUnit, ParameterUnit
 from hexacell.kinematics.pose import AXES, PoseBatch
 from hexacell.kinematics.rotations import Array
+from hexacell.lengths import MM_PER_METRE
 from hexacell.robot.model import Robot
 from hexacell.storage.toml_document import KeyPath
 
 MOST = 0.5
 """Share of the stated poses."""
 
-MM_PER_METRE, DEG_PER_RAD = 1000.0, float(np.degrees(1.0))
+DEG_PER_RAD = float(np.degrees(1.0))
 
 SMALL_SHARE = 0.02
 """Share of the largest length of the drawing below which limits are none in millimetres."""
@@ -93,23 +94,19 @@ def asked_of_limits(cell: Cell, robot: Robot, commands: PoseBatch) -> Iterator[A
     def length_is_small(*ends: float) -> bool:
         return max(map(abs, ends)) < SMALL_SHARE * size_mm
 
-    for field, largest, angles in (
-        ("tilt_deg", limits.tilt_deg, commands.tilts()),
-        ("turn_deg", limits.turn_deg, np.abs(commands.turns())),
+    nothing = np.zeros(len(commands))  # what they ask of a cone is not known without its axes
+    for path, asked in (
+        (("limits", "tilt_deg"), commands.tilts()),
+        (("limits", "turn_deg"), np.abs(commands.turns())),
+        (("limits", "passive_joints", "base_cone_deg"), nothing),
+        (("limits", "passive_joints", "platform_cone_deg"), nothing),
     ):
-        is_round = largest <= np.pi and _chance_of_radians([largest]) < CHANCE_OF_ONE
-        numbers, stated, small = np.degrees(angles)[:, None], f"{field} = {largest:g}", largest <= np.pi
-        path: KeyPath = ("limits", field)
-        ends = {field: largest}
+        field, section = path[-1], limits.passive_joints if "passive_joints" in path else limits
+        largest = float(np.max(getattr(section, field)))
+        small = largest <= np.pi
+        is_round = small and _chance_of_radians([largest]) < CHANCE_OF_ONE
+        numbers, stated, ends = np.degrees(asked)[:, None], f"{field} = {largest:g}", {field: largest}
         yield AskedOfLimit(path, stated, -np.inf, largest, numbers, DEG_PER_RAD, small, ends, is_round)
-    for field in ("base_cone_deg", "platform_cone_deg"):
-        widest = float(np.max(getattr(limits.passive_joints, field)))
-        path, ends = ("limits", "passive_joints", field), {field: widest}
-        # What the poses ask of it is not known without its axes: only its digits tell.
-        is_round = widest <= np.pi and _chance_of_radians([widest]) < CHANCE_OF_ONE
-        nothing = np.zeros((len(commands), 1))
-        stated = f"{field} = {widest:g}"
-        yield AskedOfLimit(path, stated, -np.inf, widest, nothing, DEG_PER_RAD, is_round, ends, is_round)
     joints = robot.mechanism.inverse(robot.commanding, robot.branch, robot.frames.poses(commands))
     joints = joints[np.isfinite(joints).all(axis=-1)]
     is_angle = robot.mechanism.words.joint_unit is JointUnit.DEG

@@ -27,7 +27,7 @@ from hexacell.study.paper_simulation import (
     PlannedSet,
 )
 from hexacell.text.layout import wrapped
-from hexacell.text.svg_drawing import AFTER, BEFORE, SMALLEST_MM, as_svg, new_figure
+from hexacell.text.svg_drawing import AFTER, BEFORE, SMALLEST_MM, as_svg, columns, new_figure
 
 WHAT_THE_PAPER_SAYS = {
     4: f"The paper: one point never; two or more without noise {PAPER_EXACT_MM:g} mm, after a limited "
@@ -167,8 +167,7 @@ def study_picture(study: PaperStudy) -> str:
                     if isfinite(error)
                 ]
                 name = f"{estimator}, {'0.01 mm of noise' if noise == 'noisy' else 'no noise'}"
-                x, y = zip(*shown, strict=True) if shown else ((), ())
-                axes.semilogy(x, y, marker + line, color=colour, label=name, markersize=4)
+                axes.semilogy(*columns(shown), marker + line, color=colour, label=name, markersize=4)
         label = "the paper of figure 4, 5 points, noise"
         axes.axhline(PAPER_NOISY_MM, color="#888888", linewidth=0.6, label=label)
         axes.set_xticks(range(1, 6))

@@ -23,7 +23,7 @@ from hexacell.text.paper_study import (
     study_lines,
     study_picture,
 )
-from hexacell.text.svg_drawing import AFTER, BEFORE, INK, as_svg, new_figure, plain_ticks
+from hexacell.text.svg_drawing import AFTER, BEFORE, INK, as_svg, columns, new_figure, plain_ticks
 
 WAYS = (
     "adaptive: this program's, through the controller's own wrong geometry at first. best fixed: selected "
@@ -104,8 +104,7 @@ def design_picture(study: DesignStudy) -> str:
             for count, one in curve.by_records.items()
             if 2 * one.robots > curve.tried
         ]
-        x, y = zip(*errors, strict=True) if errors else ((), ())
-        large.semilogy(x, y, marker + line, color=colour, label=name, markersize=4)
+        large.semilogy(*columns(errors), marker + line, color=colour, label=name, markersize=4)
     large.set_xlabel("records")
     large.set_ylabel("largest error of a parameter, mm")
     large.legend(
@@ -120,7 +119,7 @@ def design_picture(study: DesignStudy) -> str:
 
 def _draw_sweep(axes: Any, name: str, rows: Mapping[float, Spread]) -> None:  # noqa: ANN401 - matplotlib's
     shown = [(value, one.task_mm) for value, one in rows.items() if isfinite(one.task_mm)]
-    x, y = zip(*shown, strict=True) if shown else ((), ())
+    x, y = columns(shown)
     axes.plot(x, y, "s-", color=AFTER, markersize=4)
     axes.set_xlabel(name)
     if name.startswith("noise"):

@@ -2,6 +2,7 @@
 
 import io
 import re
+from collections.abc import Sequence
 from typing import Any
 
 SMALLEST_MM = 1e-4
@@ -32,6 +33,11 @@ def new_figure(size: tuple[float, float], *places: Place) -> tuple[Any, list[Any
     with rc_context(STYLE):
         figure = Figure(figsize=size)
         return figure, [figure.add_axes(place) for place in places]
+
+
+def columns(pairs: Sequence[tuple[float, float]]) -> tuple[Sequence[float], Sequence[float]]:
+    """The first and the second numbers of some pairs."""
+    return [x for x, _ in pairs], [y for _, y in pairs]
 
 
 def plain_ticks(axis: Any) -> None:  # noqa: ANN401 - matplotlib is imported where it is used

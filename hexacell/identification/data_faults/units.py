@@ -14,8 +14,7 @@ from hexacell.identification.data_faults.hypotheses import GaugeFault, GaugeFaul
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.result import GAUGES, DataFault, DataFaultKind
 from hexacell.kinematics.rotations import Mask
-
-MM_PER_METRE = 1000.0
+from hexacell.lengths import MM_PER_METRE
 
 FAR_BEYOND = 10.0
 """Times the travel that nobody states too small by mistake."""

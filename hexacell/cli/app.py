@@ -35,7 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             _require_usable(typed)
             options = parser.parse_args(typed)
             require_platform(options.target)
-            code = _carried_out(options, typed)
+            code = _carried_out(options, typed, console)
             if code or (lost := lost_output()) is None:
                 return code
             # What nobody can read is not done.
@@ -49,9 +49,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _failed(fault_line(error, typed), ExitCode.FAULT, console)
 
 
-def _carried_out(options: argparse.Namespace, typed: Sequence[str]) -> int:
+def _carried_out(options: argparse.Namespace, typed: Sequence[str], console: Console) -> int:
     """The exit code of the command, whose beginning, end and failure are logged where that is asked for."""
-    module, _, command = options.target.partition(".")
     inherited = os.environ.get(LOG_FILE)
     file = getattr(options, "log_file", None if inherited is None else Path(inherited))
     verbosity = getattr(options, "verbose", 0)
@@ -59,8 +58,13 @@ def _carried_out(options: argparse.Namespace, typed: Sequence[str]) -> int:
         os.environ[LOG_FILE] = str(file.absolute())  # the screen's run is in a process of its own
     elif options.target == "tui.main" and verbosity:
         raise UsageError("the screen takes the whole terminal", action="Name a file: --log-file FILE")
+
+    def carry_out() -> int:
+        module, _, command = options.target.partition(".")
+        return int(getattr(import_module(f"hexacell.cli.commands.{module}"), command)(options, console))
+
     if file is None and not verbosity:  # the usual case needs no module for it
-        return int(getattr(import_module(f"hexacell.cli.commands.{module}"), command)(options))
+        return carry_out()
     import logging  # noqa: PLC0415 - only where a log is asked for
 
     from hexacell.cli.log import log  # noqa: PLC0415 - likewise
@@ -69,7 +73,7 @@ def _carried_out(options: argparse.Namespace, typed: Sequence[str]) -> int:
     with log(file, verbosity):
         logger.info("hexacell %s: %s", __version__, shlex.join(typed))
         try:
-            code = int(getattr(import_module(f"hexacell.cli.commands.{module}"), command)(options))
+            code = carry_out()
         except HexacellError as error:
             logger.error("exit code %d: %s", error.exit_code, error)  # noqa: TRY400 - foreseen, no fault
             raise

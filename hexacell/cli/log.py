@@ -25,9 +25,6 @@ def log(file: Path | None, verbosity: int) -> Iterator[None]:
     Raises:
         FileError: the file cannot be written.
     """
-    if file is None and not verbosity:
-        yield
-        return
     try:
         handler = logging.StreamHandler() if file is None else logging.FileHandler(file, encoding="utf-8")
     except OSError as error:

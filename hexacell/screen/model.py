@@ -3,7 +3,6 @@
 import asyncio
 import time
 from collections.abc import Awaitable, Callable
-from functools import partial
 from operator import is_
 from typing import Any
 
@@ -27,7 +26,7 @@ from hexacell.text.screens.run_picture import header_line
 from hexacell.text.screens.views import ChecklistItem, FaultView, Line, QuestionView, Urgency
 from procedures.calibration.calibration import Mode
 from procedures.engine.command_loop import Status
-from procedures.engine.commands import Abort, Answer, Command, MeasureAgain, Pause, Resume, Undo
+from procedures.engine.commands import Abort, Answer, MeasureAgain, Pause, Resume, Undo
 from procedures.run.keys import ThreeNumbers
 
 SPEEDS = (0.0, 1.0, 10.0, 60.0, 600.0)
@@ -58,25 +57,6 @@ class ScreenModel:
         self._trial: asyncio.Future[TriedPlan] | None = None
         self._described: tuple[Cell | None, tuple[str, ...]] = (None, ())
         self._reviewed: tuple[tuple[object, ...], dict[str, tuple[Any, ...]]] | None = None
-        self._does: dict[ScreenAction, Callable[[str], Awaitable[str | None]]] = {
-            ScreenAction.PAUSE: self._pause,
-            ScreenAction.PAUSE_AT_ONCE: partial(self._give, Pause(at_once=True)),
-            ScreenAction.UNDO: partial(self._give, Undo()),
-            ScreenAction.MEASURE_AGAIN: self._measure_again,
-            ScreenAction.ABORT: partial(self._give, Abort()),
-            ScreenAction.TAKE_CONTROL: self._take_control,
-            ScreenAction.CHECK: self._check,
-            ScreenAction.START: self._start,
-            ScreenAction.PREVIEW: self._preview,
-            ScreenAction.EXCLUDE: self._exclude,
-            ScreenAction.COMPARE: partial(self._show_below, workplace.compare),
-            ScreenAction.ROLL_BACK: partial(self._change_config, workplace.roll_back),
-            ScreenAction.APPLY: partial(self._change_config, workplace.apply),
-            ScreenAction.OPEN: self._open,
-            ScreenAction.DRIFT: partial(self._show_below, lambda _: workplace.drift()),
-            ScreenAction.STEP: self._step,
-            ScreenAction.PLAY: self._play,
-        }
 
     async def attend(self) -> None:
         """Follow the cell and its run until cancelled."""
@@ -269,11 +249,51 @@ class ScreenModel:
             case _:
                 return True
 
-    async def perform(self, action: ScreenAction, argument: str = "") -> str:
+    async def perform(  # noqa: C901, PLR0912 - a case an action
+        self, action: ScreenAction, argument: str = ""
+    ) -> str:
         """Do what was asked for; a remark about it, or an empty text."""
         if not self.allows(action):
             raise UsageError(f"{action} has no effect now")
-        return await self._does[action](argument) or ""
+        workplace, connection, at = self._workplace, self.run.connection, self.run.picture.at
+        match action:
+            case ScreenAction.PAUSE:
+                is_paused = self.run.picture.status in {Status.PAUSED, Status.PAUSING}
+                await self.run.give(Resume() if is_paused else Pause())
+            case ScreenAction.PAUSE_AT_ONCE:
+                await self.run.give(Pause(at_once=True))
+            case ScreenAction.UNDO:
+                await self.run.give(Undo())
+            case ScreenAction.MEASURE_AGAIN if at is not None:
+                await self.run.give(MeasureAgain(at))
+            case ScreenAction.MEASURE_AGAIN:
+                raise UsageError("no point is being measured now")
+            case ScreenAction.ABORT:
+                await self.run.give(Abort())
+            case ScreenAction.TAKE_CONTROL if connection is not None:
+                await connection.take_control()
+            case ScreenAction.CHECK:
+                await self._check(argument)
+            case ScreenAction.START:
+                await self._start(argument)
+            case ScreenAction.PREVIEW:
+                await self._preview(argument)
+            case ScreenAction.EXCLUDE:
+                await workplace.toggle_exclusion(argument, self._tried.poses if self._tried else ())
+                await self._preview("")
+            case ScreenAction.COMPARE:
+                self._compared = await workplace.compare(argument)
+            case ScreenAction.DRIFT:
+                self._compared = await workplace.drift()
+            case ScreenAction.ROLL_BACK:
+                return await self._change_config(workplace.roll_back, argument)
+            case ScreenAction.APPLY:
+                return await self._change_config(workplace.apply, argument)
+            case ScreenAction.OPEN:
+                await self.run.follow(await workplace.open_run(argument))
+            case ScreenAction.STEP | ScreenAction.PLAY if (recording := self._recording) is not None:
+                self._wind(recording, action, argument)
+        return ""
 
     async def confirmation(self, action: ScreenAction, argument: str) -> QuestionView | None:
         """What a person must consent to before an action; None if to nothing."""
@@ -294,23 +314,6 @@ class ScreenModel:
         """Let the run go on alone, or have it stopped."""
         if self._is_running:
             await self.run.leave(keep_running=keep_running)
-
-    async def _give(self, command: Command, _: str = "") -> None:
-        await self.run.give(command)
-
-    async def _pause(self, _: str) -> None:
-        is_paused = self.run.picture.status in {Status.PAUSED, Status.PAUSING}
-        await self._give(Resume() if is_paused else Pause())
-
-    async def _measure_again(self, _: str) -> None:
-        at = self.run.picture.at
-        if at is None:
-            raise UsageError("no point is being measured now")
-        await self._give(MeasureAgain(at))
-
-    async def _take_control(self, _: str) -> None:
-        if self.run.connection is not None:
-            await self.run.connection.take_control()
 
     async def _check(self, what: str) -> None:
         self._checked, self._is_ready, self._is_checking = None, False, True
@@ -351,13 +354,6 @@ class ScreenModel:
         finally:
             trial.cancel()
 
-    async def _exclude(self, name: str) -> None:
-        await self._workplace.toggle_exclusion(name, () if self._tried is None else self._tried.poses)
-        await self._preview("")
-
-    async def _show_below(self, found: Callable[[str], Awaitable[tuple[str, ...]]], run: str) -> None:
-        self._compared = await found(run)
-
     async def _change_config(
         self, change: Callable[[str, str], Awaitable[tuple[str, ...]]], run: str
     ) -> str:
@@ -371,9 +367,6 @@ class ScreenModel:
         await self._read_history()
         return RELOAD if RELOAD in " ".join(self._compared) else self._compared[-1]
 
-    async def _open(self, run: str) -> None:
-        await self.run.follow(await self._workplace.open_run(run))
-
     async def _read_history(self) -> None:
         """Read which runs there are; where that fails, the history says why."""
         try:
@@ -381,20 +374,15 @@ class ScreenModel:
         except HexacellError as error:
             self.runs, self._compared = (), tuple(str(error).splitlines())
 
-    async def _step(self, argument: str) -> None:
-        """To an end, or by a number of events."""
-        if (recording := self._recording) is not None:
-            ends = {"first": 1, "last": recording.last}
-            if argument in ends:
-                recording.jump(ends[argument])
-            else:
-                recording.step(int(argument or 1))
-
-    async def _play(self, argument: str) -> None:
-        """Halt or go on; ``+`` faster, ``-`` slower."""
-        cursor = self.run.picture.cursor
-        speed = 0.0 if cursor is None else cursor.speed
-        place = SPEEDS.index(speed) if speed in SPEEDS else 0
-        wanted = {"+": place + 1, "-": place - 1}.get(argument, 0 if place else 1)
-        if self._recording is not None:
-            self._recording.set_speed(SPEEDS[min(max(wanted, 0), len(SPEEDS) - 1)])
+    def _wind(self, recording: RecordedRun, action: ScreenAction, argument: str) -> None:
+        """Step to an end or by a number of events; play or halt, ``+`` faster, ``-`` slower."""
+        if action is ScreenAction.PLAY:
+            cursor = self.run.picture.cursor
+            speed = 0.0 if cursor is None else cursor.speed
+            place = SPEEDS.index(speed) if speed in SPEEDS else 0
+            wanted = {"+": place + 1, "-": place - 1}.get(argument, 0 if place else 1)
+            recording.set_speed(SPEEDS[min(max(wanted, 0), len(SPEEDS) - 1)])
+        elif (end := {"first": 1, "last": recording.last}.get(argument)) is not None:
+            recording.jump(end)
+        else:
+            recording.step(int(argument or 1))

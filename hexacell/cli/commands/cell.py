@@ -11,9 +11,8 @@ from hexacell.errors import ExitCode
 from hexacell.text.config_changes import files_named
 
 
-def main(options: argparse.Namespace) -> ExitCode:
+def main(options: argparse.Namespace, console: Console) -> ExitCode:
     """Validate a cell file, print its schema, or show it with defaults."""
-    console = Console(options.json)
     if options.action == "schema":
         console.document(schema())
         if not options.json:

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import shtab
 
 from hexacell.cell.bundled import bundled_names
+from hexacell.cli.console import Console
 from hexacell.cli.parser import make_parser
 from hexacell.errors import ExitCode
 
@@ -24,7 +25,7 @@ BY_OPTION = {"--measurements": CSV_FILE}
 """What a shell offers by the option, where its value's name says less."""
 
 
-def main(options: argparse.Namespace) -> ExitCode:
+def main(options: argparse.Namespace, _: Console) -> ExitCode:
     """Print the script for a shell."""
     parser = make_parser()
     for action in _actions(parser):

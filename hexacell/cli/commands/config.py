@@ -19,9 +19,8 @@ from hexacell.text.documents import applied_document, rollback_document
 from procedures.engine.commands import UnattendedOperator
 
 
-def apply_run(options: argparse.Namespace) -> ExitCode:
+def apply_run(options: argparse.Namespace, console: Console) -> ExitCode:
     """Write the proposal of a run; a person is asked where a gate needs one."""
-    console = Console(options.json)
     proposal = read_proposal(RunFolder(options.run))
     if (settled := settle_config(*proposal.change.paths)) is not None:
         console.warn(settled)
@@ -32,9 +31,8 @@ def apply_run(options: argparse.Namespace) -> ExitCode:
     return ExitCode.DONE
 
 
-def rollback_config(options: argparse.Namespace) -> ExitCode:
+def rollback_config(options: argparse.Namespace, console: Console) -> ExitCode:
     """Undo the latest write, or restore what a run wrote."""
-    console = Console(options.json)
     with _edits_shown(console):
         done = roll_back_config(cell_at(options.cell, console), options.to, reason=options.reason)
     console.show(rollback_document(done), rollback_text(done))

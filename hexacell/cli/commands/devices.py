@@ -21,9 +21,8 @@ from hexacell.text.screens.first_questions import FirstCellAssistant
 TCP_PORTS = 1 << 16
 
 
-def main(options: argparse.Namespace) -> ExitCode:
+def main(options: argparse.Namespace, console: Console) -> ExitCode:
     """Search, or watch one device of a cell; nothing moves. Only ``--set-node`` sets a device."""
-    console = Console(options.json)
     if options.diagnose is not None and options.ports:
         problem = f"--diagnose watches a device of the cell, and {options.ports[0]} is a port"
         raise UsageError(problem, action="Leave the port out, or --diagnose")

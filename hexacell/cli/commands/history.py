@@ -23,9 +23,8 @@ from procedures.journal.journal import read_entries
 MOST_DAYS = 36525.0
 
 
-def main(options: argparse.Namespace) -> ExitCode:
+def main(options: argparse.Namespace, console: Console) -> ExitCode:
     """List, compare, or look for drift; nothing is changed but by ``--delete``."""
-    console = Console(options.json)
     if options.delete and options.keep is None:
         raise UsageError("--delete needs --keep DAYS", action="Say how old the runs are that may go")
     if options.cell is None:

@@ -24,7 +24,7 @@ from hexacell.services.run.calibration_run import RunRequest
 from procedures.calibration.calibration import Mode
 
 
-def main(options: argparse.Namespace) -> ExitCode:
+def main(options: argparse.Namespace, _: Console) -> ExitCode:
     """Serve one run; stdout gets one line, which says that it listens or why it does not."""
     if os.fork():
         os._exit(0)  # whoever started it need not wait for its end

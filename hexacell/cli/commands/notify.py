@@ -10,9 +10,8 @@ from hexacell.services.notify.outbox import notify_test, send_waiting, waiting_n
 from hexacell.text.operation import notifications_document, notifications_text, notify_document, notify_text
 
 
-def main(options: argparse.Namespace) -> ExitCode:
+def main(options: argparse.Namespace, console: Console) -> ExitCode:
     """List, send what waits, or try everybody."""
-    console = Console(options.json)
     cell = cell_at(options.cell, console)
     if not (options.test or options.send):
         settings, waiting = cell.settings.notifications, waiting_notices(cell)

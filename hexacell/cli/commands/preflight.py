@@ -23,9 +23,8 @@ SEARCH = (
 )
 
 
-def main(options: argparse.Namespace) -> ExitCode:
+def main(options: argparse.Namespace, console: Console) -> ExitCode:
     """Report every failure at once, move nothing; then predict what the plan gives."""
-    console = Console(options.json)
     cell = cell_with_devices_at(options.cell, console)
     mode = Mode(options.mode)
     try:

@@ -19,9 +19,8 @@ from hexacell.verdict.fit_document import fit_document
 MANY_RECORDS = 200
 
 
-def fit(options: argparse.Namespace) -> ExitCode:
+def fit(options: argparse.Namespace, console: Console) -> ExitCode:
     """Identify the geometry and report all that is known of the result."""
-    console = Console(options.json)
     cell = cell_at(options.cell, console)
     folder = RunFolder(options.measurements.parent)
     measurements = read_measurements(options.measurements)
@@ -34,9 +33,8 @@ def fit(options: argparse.Namespace) -> ExitCode:
     return ExitCode.DONE if assessed.is_usable else ExitCode.OUT_OF_LIMITS
 
 
-def propose_next(options: argparse.Namespace) -> ExitCode:
+def propose_next(options: argparse.Namespace, console: Console) -> ExitCode:
     """Propose the pose worth measuring next, for controllers that hexacell does not drive."""
-    console = Console(options.json)
     cell = cell_at(options.cell, console)
     measurements = read_measurements(options.measurements, allow_partial=True)
     if len(measurements) <= MOST_RECORDS_BEFORE_NEXT:

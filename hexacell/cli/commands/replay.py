@@ -13,9 +13,8 @@ from procedures.replay.recorded_executor import TOLERANCE
 from procedures.replay.replayer import Scope
 
 
-def main(options: argparse.Namespace) -> ExitCode:
+def main(options: argparse.Namespace, console: Console) -> ExitCode:
     """Replay, and report what differs from the recording; or export the run, and replay nothing."""
-    console = Console(options.json)
     if options.export is not None:
         names = export_run(options.run, options.export)
         console.show(

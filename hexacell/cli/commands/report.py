@@ -17,9 +17,8 @@ CERTIFICATE = ".xml"
 KINDS = (".html", ".htm", ".pdf", CERTIFICATE)
 
 
-def main(options: argparse.Namespace) -> ExitCode:
+def main(options: argparse.Namespace, console: Console) -> ExitCode:
     """Write the report; the run folder is only read, unless the report goes into it."""
-    console = Console(options.json)
     target = options.output or options.run / "report.html"
     _require_possible(target, is_comparison=options.compare is not None)
     earlier = None if options.compare is None else reported_run(options.compare)

@@ -45,14 +45,13 @@ from procedures.run.trips import may_still_move
 from procedures.steps import events
 
 
-def main(options: argparse.Namespace) -> ExitCode:
+def main(options: argparse.Namespace, console: Console) -> ExitCode:
     """Calibrate a cell, or check it."""
     mode = Mode(options.mode or ("check" if options.unattended else "optimise"))
     if mode is Mode.CHECK and options.length_check:
         raise UsageError(
             "a check does not check the length scale", action="Use `hexacell length`, or --mode optimise"
         )
-    console = Console(options.json)
     request = replace(_request(options, console, mode), length_check=options.length_check)
     if options.events is None:
         return _run_to_end(request, console)
@@ -60,9 +59,8 @@ def main(options: argparse.Namespace) -> ExitCode:
         return _run_to_end(request, console, stream)
 
 
-def length(options: argparse.Namespace) -> ExitCode:
+def length(options: argparse.Namespace, console: Console) -> ExitCode:
     """Check the scale of the encoders of a calibrated cell."""
-    console = Console(options.json)
     return _run_to_end(_request(options, console, Mode.LENGTH), console)
 
 
@@ -90,9 +88,8 @@ def _cell(options: argparse.Namespace, console: Console, mode: Mode) -> Cell:
         raise
 
 
-def demo(options: argparse.Namespace) -> ExitCode:
+def demo(options: argparse.Namespace, console: Console) -> ExitCode:
     """Copy a simulated cell into a folder of its own and calibrate it there."""
-    console = Console(options.json)
     request = prepare_demo(options.folder, options.config)
     console.print(demo_opening(request.cell.settings.mechanism.words.machine, request.cell.config_path))
     return _run_to_end(request, console)

@@ -17,9 +17,8 @@ from hexacell.text import operation
 from hexacell.text.documents import schedule_document
 
 
-def main(options: argparse.Namespace) -> ExitCode:
+def main(options: argparse.Namespace, console: Console) -> ExitCode:
     """Write, show or remove a schedule; nothing is started or stopped."""
-    console = Console(options.json)
     cell = cell_at(options.cell, console)
     if options.show or options.remove:
         found = (present_schedule if options.show else remove_schedule)(cell, options.folder)

@@ -15,9 +15,8 @@ from hexacell.services.preflight import is_loopback
 STOPS = (signal.SIGINT, signal.SIGTERM)
 
 
-def main(options: argparse.Namespace) -> ExitCode:
+def main(options: argparse.Namespace, console: Console) -> ExitCode:
     """Serve until interrupted; runs are only read."""
-    console = Console()
     cell = cell_at(options.cell, console)
     settings = cell.settings.opcua
     if settings is None:

@@ -13,9 +13,8 @@ from hexacell.services.run.demo import served_cell, with_faults
 from hexacell.storage.atomic_files import write_atomically
 
 
-def main(options: argparse.Namespace) -> ExitCode:
+def main(options: argparse.Namespace, console: Console) -> ExitCode:
     """Serve until interrupted; stdout gets a cell file with the addresses of the served devices."""
-    console = Console()
     cell = with_faults(cell_at(options.cell, console), options.fault)
     if options.output is not None:
         own = {path.resolve() for path in (cell.path, *cell.config_paths)}

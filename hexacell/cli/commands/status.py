@@ -19,9 +19,8 @@ from hexacell.storage.atomic_files import write_atomically
 from hexacell.text.cells import fleet_document, fleet_text, metrics_text, status_document, status_text
 
 
-def main(options: argparse.Namespace) -> ExitCode:
+def main(options: argparse.Namespace, console: Console) -> ExitCode:
     """Show the cells; nothing is changed but the file of metrics, which is replaced whole."""
-    console = Console(options.json)
     if not options.cells:
         return _fleet(options, console)
     if options.archive is not None:

@@ -10,9 +10,9 @@ from hexacell.study.tasks import NewExecutor, processes, run_study
 from hexacell.text.studies import STUDIES
 
 
-def main(options: argparse.Namespace) -> ExitCode:
+def main(options: argparse.Namespace, console: Console) -> ExitCode:
     """One of the studies; its picture goes into the folder of its results."""
-    console, shown, new_executor = Console(options.json), STUDIES[options.study], _executors(options)
+    shown, new_executor = STUDIES[options.study], _executors(options)
     with task_bar(shown.study.unit) as progress:
         found = run_study(shown.study, options.folder, options.draws, new_executor, progress)
     for line in shown.lines(found):

@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.preferences import preferences_path, read_preferences
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from hexacell.screen.model import ScreenModel
 
 
-def main(options: argparse.Namespace) -> ExitCode:
+def main(options: argparse.Namespace, _: Console) -> ExitCode:
     """Show the screen until the person leaves it; then the process ends at once.
 
     Raises:

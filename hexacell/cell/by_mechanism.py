@@ -18,6 +18,7 @@ from hexacell.cell.fields import GeometrySettings, InRange, NotNegative, Positiv
 from hexacell.cell.limits import LimitSettings, SpeedSettings
 from hexacell.cell.measuring import GuardSettings, NoiseSettings, TimingSettings
 from hexacell.cell.model import CellSettings, ToleranceSettings
+from hexacell.cell.model_terms import ModelSettings
 from hexacell.cell.robot import ControllerSettings, RobotSettings, RotaryControllerSettings, mechanism_of
 from hexacell.cell.simulation import SimulatedEncoders, SimulatedJoints, SimulatedMotion, SimulationSettings
 from hexacell.cell.uncertainty import (
@@ -36,6 +37,7 @@ IN_DEG: Mapping[type[Section], Mapping[str, float]] = {
     NoiseSettings: {"encoder": 0.003},
     SpeedSettings: {"joint": 30.0, "joint_at_gauges": 7.5},
     TimingSettings: {"spread_encoder": 0.02},
+    ModelSettings: {"backlash": 0.03},
     GuardSettings: {"following": 0.3},
     SimulatedEncoders: {"noise": 0.003, "flicker": 0.0003},
     SimulatedMotion: {"speed": 30.0},
@@ -102,6 +104,7 @@ def _cell_model(mechanism: str, encoder_scales: bool) -> type[CellSettings]:
             speed=SpeedSettings,
             timing=TimingSettings,
             guards=GuardSettings,
+            model=ModelSettings,
         ),
     )
 

@@ -22,6 +22,7 @@ from hexacell.cell.measuring import (
     TimingSettings,
     VerificationSettings,
 )
+from hexacell.cell.model_terms import ModelSettings
 from hexacell.cell.operation import (
     MOST_NOTIFICATIONS,
     ArchiveSettings,
@@ -67,6 +68,7 @@ class CellSettings(Section):
     tolerances: ToleranceSettings = ToleranceSettings()
     noise: NoiseSettings = NoiseSettings()
     uncertainty: CommonUncertaintySettings = CommonUncertaintySettings()
+    model: ModelSettings = ModelSettings()
     limits: LimitSettings = LimitSettings()
     exclusions: tuple[ExclusionSettings, ...] = Field((), max_length=MOST_EXCLUSIONS)
     speed: SpeedSettings = SpeedSettings()

@@ -9,6 +9,7 @@ import numpy as np
 
 from hexacell.identification.problem.prior import Noise
 from hexacell.kinematics.commanded_motion import ActualPoses, CommandedRobot, RefusedCommands
+from hexacell.kinematics.corrections import NO_CORRECTIONS, Corrections
 from hexacell.kinematics.forward import apply_twist
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.mechanism import Branch, Mechanism
@@ -38,6 +39,7 @@ class RobotBelief:
         free: estimated free parameters (p,), mm.
         covariance: of the free parameters (p, p), mm^2.
         work_frame_turns: axes (k, 3) about which a work frame can be taught.
+        corrections: what the controller adds to its inverse kinematics for what is not geometry.
     """
 
     mechanism: Mechanism
@@ -49,6 +51,7 @@ class RobotBelief:
     limits: Limits
     work_frame_turns: Array = field(default_factory=lambda: np.eye(3))
     refused: RefusedCommands = field(default_factory=RefusedCommands)
+    corrections: Corrections = NO_CORRECTIONS
 
     def zeroed_at(self, shown_mm: tuple[float, float, float] | None) -> RobotBelief:
         """This belief with gauges that were zeroed where they show ``shown_mm`` along base x, y, z."""

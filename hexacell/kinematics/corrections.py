@@ -33,6 +33,11 @@ class Corrections:
     weight_direction: Three = (0.0, 0.0, -1.0)
     weight_centre_mm: Three | None = None
 
+    def of(self, term: str) -> Six:
+        """The coefficients for a term of the model, by its name."""
+        by_name = {"backlash": self.backlash, "play": self.play_mm, "compliance": self.compliance_um_n}
+        return by_name[term]
+
     @property
     def are_none(self) -> bool:
         """Whether nothing is corrected."""

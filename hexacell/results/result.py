@@ -23,6 +23,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import ParameterSet
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import Deviation, RecordId
+from hexacell.results.term_result import TermResult, term_results
 from hexacell.uncertainty.statement import COVERAGE_FACTOR
 
 
@@ -54,7 +55,8 @@ class IdentificationResult(Frozen):
     ``expected_chi2`` is the mean of ``chi2`` if model and noise are right: ``dof``, and more where
     tolerances or an earlier result determine parameters. Older journals have it for the latter only, else
     None. ``identifies`` says which parameters are identified; the others are as the controller has them,
-    with their tolerances as sigma.
+    with their tolerances as sigma. ``terms`` are those beside the geometry that the records were searched
+    for; older journals have none.
     """
 
     converged: bool
@@ -74,6 +76,7 @@ class IdentificationResult(Frozen):
     expected_chi2: float | None = None
     noise_freedom: float | None = None
     identifies: ParameterChoice = ParameterChoice.ALL
+    terms: tuple[TermResult, ...] = ()
 
     @classmethod
     def of(cls, found: Identification, zeros: IdentifiedZeros | None = None) -> Self:
@@ -97,6 +100,7 @@ class IdentificationResult(Frozen):
             expected_chi2=found.goodness.expected,
             noise_freedom=None if np.isinf(found.problem.noise.freedom) else found.problem.noise.freedom,
             identifies=ParameterChoice.ALL if zeros is None else ParameterChoice.ZEROS,
+            terms=term_results(found),
         )
 
     def document(self, parameters: ParameterSet) -> dict[str, Any]:

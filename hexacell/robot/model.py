@@ -29,7 +29,9 @@ from hexacell.identification.problem.commanded_poses import CommandingGeometry
 from hexacell.identification.problem.prior import Noise, Prior, Tolerances
 from hexacell.identification.problem.problem import Assumptions, Problem
 from hexacell.identification.solver.result import GeometryEstimate, Identification
+from hexacell.identification.terms.term import ModelTerm
 from hexacell.kinematics.commanded_motion import CommandedRobot, RefusedCommands
+from hexacell.kinematics.corrections import NO_CORRECTIONS, Corrections
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism, joint_zeros
 from hexacell.kinematics.parameters import ParameterSet
@@ -39,7 +41,7 @@ from hexacell.limits.limits import Limits
 from hexacell.measurements.records import MeasurementSet
 from hexacell.plugins import Group, load
 from hexacell.robot.same_robot import require_frames, require_same_robot
-from hexacell.robot.stated import stated_effects, stated_limits
+from hexacell.robot.stated import stated_effects, stated_limits, stated_terms
 from hexacell.uncertainty.effects import Effect, errors_by_effects
 
 
@@ -63,6 +65,8 @@ class Robot:
             that the controller had before in the same run.
         work_frame: the axes of the controller's base frame about which a work frame can be taught.
         effects: systematic ones, as they are stated of the machine.
+        terms: of the model beside the geometry, which the machine may have.
+        corrections: what its controller adds to the inverse kinematics for them.
         refused: commands that the cell file excludes, and those that the controller refused in this run.
         identifies: which parameters are identified.
     """
@@ -83,6 +87,8 @@ class Robot:
     earlier: tuple[CommandingGeometry, ...] = ()
     work_frame: str = "xyz"
     effects: tuple[Effect, ...] = ()
+    terms: tuple[ModelTerm, ...] = ()
+    corrections: Corrections = NO_CORRECTIONS
     refused: RefusedCommands = field(default_factory=RefusedCommands)
     identifies: ParameterChoice = ParameterChoice.ALL
 
@@ -158,6 +164,7 @@ class Robot:
             systematic=partial(errors_by_effects, self.effects),
             unknowns=self.unknowns,
             travel_mm=self.limits.travels_mm,
+            offered=self.terms if self.identifies is ParameterChoice.ALL else (),
         )
         return assumptions.problem(measurements, before)
 
@@ -177,11 +184,13 @@ class Robot:
             self.limits,
             self.frames.base[:, ["xyz".index(axis) for axis in self.work_frame]].T,
             self.refused,
+            self.corrections,
         )
 
     def with_errors_of(self, settings: CellSettings) -> Robot:
         """The robot with the noise and the systematic effects that some settings state."""
-        return replace(self, noise=noise_of(settings), effects=stated_effects(settings))
+        effects, terms = stated_effects(settings), stated_terms(settings)
+        return replace(self, noise=noise_of(settings), effects=effects, terms=terms)
 
     def for_controller(self, geometry: Geometry) -> Geometry:
         """A geometry in the convention's frames, in the frames of the controller's config."""
@@ -324,6 +333,8 @@ def make_robot(
         earlier=(drawn,) if taught is None else (drawn, CommandingGeometry.of(mechanism, taught)),
         work_frame=settings.task.work_frame,
         effects=stated_effects(settings),
+        terms=stated_terms(settings),
+        corrections=controller.corrections,
         refused=settings.excluded_commands,
         identifies=(ParameterChoice.ZEROS if settings.identification.only_zeros else ParameterChoice.ALL),
     )

@@ -13,6 +13,10 @@ from hexacell.cell.uncertainty import (
 )
 from hexacell.config.interface import ControllerGeometry, ControllerLimits
 from hexacell.errors import ReachError
+from hexacell.identification.terms.backlash import backlash
+from hexacell.identification.terms.compliance import compliance
+from hexacell.identification.terms.play import play
+from hexacell.identification.terms.term import ModelTerm
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism, joint_zeros
@@ -218,17 +222,31 @@ def stated_effects(settings: CellSettings, measured_range_k: float | None = None
 
 
 def _own_weight(settings: CellSettings) -> Effect:
-    """The effect of the platform's weight; its centre and direction are stated in the drawing's frames."""
-    stated, drawing = settings.uncertainty, _drawing(settings)
-    frames = settings.mechanism.normalize_frames(drawing)[1]
-    centre = stated.own_weight_centre_mm
+    """The effect of the platform's weight."""
+    stated, source = settings.uncertainty, settings.uncertainty.source("own_weight_n")
     return own_weight(
-        stated.own_weight_n,
-        stated.leg_compliance_um_n,
-        frames.base @ _unit(stated.own_weight_direction),
-        None if centre is None else frames.platform @ np.array(centre),
-        stated.source("own_weight_n"),
+        stated.own_weight_n, stated.leg_compliance_um_n, *_weight_acts(settings), source=source
     )
+
+
+def _weight_acts(settings: CellSettings) -> tuple[Array, Array | None]:
+    """Direction (3,) and centre (3,) of the weight in the convention; they are stated in the drawing's."""
+    stated, frames = settings.uncertainty, settings.mechanism.normalize_frames(_drawing(settings))[1]
+    centre = stated.own_weight_centre_mm
+    direction = frames.base @ _unit(stated.own_weight_direction)
+    return direction, None if centre is None else frames.platform @ np.array(centre)
+
+
+def stated_terms(settings: CellSettings) -> tuple[ModelTerm, ...]:
+    """The terms beside the geometry that a cell's records are searched for."""
+    stated, newton = settings.model, settings.uncertainty.own_weight_n
+    acts, unit = _weight_acts(settings), settings.mechanism.words.joint_unit
+    terms = {
+        "backlash": backlash(stated.backlash, unit),
+        "play": play(stated.play_mm, *acts),
+        "compliance": compliance(stated.compliance_um_n, newton, *acts),
+    }
+    return tuple(terms[name] for name in stated.terms if newton or name != "compliance")
 
 
 def _drawing(settings: CellSettings) -> Geometry:

@@ -7,9 +7,11 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.lengths import shown, unit_of
 from hexacell.noise.record_noise import NoiseLevels, Repeatability
+from hexacell.results.term_result import term_results
 from hexacell.text.layout import counted, wrapped
 from hexacell.text.measured_noise import measured_noise_text
 from hexacell.text.parameters import parameter_rows, parameter_table
+from hexacell.text.terms import terms_text
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.verdict.assessment import Assessment
 from hexacell.verdict.decision import Verdict
@@ -35,6 +37,7 @@ def identification_report(assessed: Assessment) -> str:
         ),
         _identified(assessed),
         "\n".join(drawing_table(assessed.zeros or found, assessed.drawing)),
+        terms_text(term_results(found)),
         residual_line(found),
         _points_line(assessed),
         noise_table(assessed.noise),

@@ -7,6 +7,9 @@ of the largest error over all task poses (:mod:`~hexacell.uncertainty.statement`
 Where a length check measured the scale common to all encoders, what that makes at the task is known. The
 check errs by the noise of the estimate and by the other effects as well: what these do at the task, and
 what they do by the scale that is measured, is one line.
+
+What terms of the model beside the geometry do at the task is known as well, less what the controller
+corrects of it; what is not known of their coefficients is part of the noise, with that of the geometry.
 """
 
 from __future__ import annotations
@@ -89,7 +92,10 @@ class UncertaintyBudget:
                 scale common to all encoders, in the place of the size stated for it.
         """
         found, zeros = propagation.found, propagation.zeros
-        effects = tuple(_measured(effect, scale) for effect in effects)
+        terms = found.terms if zeros is None else None
+        taken_up = () if terms is None else [term.takes_up for term in terms.terms]
+        effects = tuple(_measured(effect, scale) for effect in effects if effect.name not in taken_up)
+        effects = (*effects, *propagation.reversals(terms))
         covariance = (zeros or found).free_covariance * found.goodness.noise_factor**2
         known: Array = np.zeros(propagation.jacobian.shape[:2])
         by_scale = None
@@ -102,8 +108,15 @@ class UncertaintyBudget:
                 covariance = covariance - columns @ columns.T
             if effect.value:
                 known = known + effect.value * propagation.columns(effect).combined.sum(axis=-1)
-        factor = covariance_factor(covariance)
-        noise = propagation.jacobian @ factor
+        if terms is None:
+            factor = covariance_factor(covariance)
+            noise = propagation.jacobian @ factor
+        else:
+            both = covariance_factor(terms.joint_covariance(covariance))
+            factor, of_terms = np.split(both, [len(covariance)])
+            by_terms = propagation.by_terms(terms)
+            noise = propagation.jacobian @ factor + by_terms @ of_terms
+            known = known + by_terms @ propagation.uncorrected(terms)
         if scale is not None and by_scale is not None:
             noise = noise + by_scale[..., None] * (scale.by_parameters @ factor)
         significant = VISIBLE_SIGMAS * np.sqrt(2.0 * found.goodness.expected)

@@ -14,7 +14,7 @@ chi-square is ``e^T M e``, with M the weights less what stations and parameters 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -27,6 +27,10 @@ from hexacell.identification.identified_zeros import IdentifiedZeros
 from hexacell.identification.placement import Placement
 from hexacell.identification.solver.measurement_model import NuisanceElimination
 from hexacell.identification.solver.result import Identification
+from hexacell.identification.solver.term_estimates import TermEstimates
+from hexacell.identification.terms.term import ModelTerm
+from hexacell.kinematics.corrections import NO_CORRECTIONS, Corrections
+from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effect_kinds import COMMON_SCALE, common_encoder_scale
@@ -57,6 +61,7 @@ class Propagation:
         jacobian: (t, 6, p) of the errors at the task poses by the free parameters.
         earlier: errors (p, k) of the estimate that was the prior, by one unit of each cause, by the names
             of the effects; empty where the prior is a drawing.
+        corrections: what the controller adds for the terms of the model.
     """
 
     found: Identification
@@ -66,6 +71,7 @@ class Propagation:
     jacobian: Array
     frames: FrameFit
     earlier: Mapping[str, Array]
+    corrections: Corrections = NO_CORRECTIONS
 
     @classmethod
     def of(
@@ -90,6 +96,7 @@ class Propagation:
             jacobian=error_jacobian(belief, task, workspace),
             frames=teachable_frames(belief, workspace),
             earlier=earlier or {},
+            corrections=belief.corrections,
         )
 
     @cached_property
@@ -147,6 +154,38 @@ class Propagation:
         absorbed = by_parameters.T @ by_causes
         return float(np.sum(by_causes**2) - np.sum(absorbed * (self.found.free_covariance @ absorbed)))
 
+    def by_terms(self, terms: TermEstimates) -> Array:
+        """Errors (t, 6, 6 m) at the task poses by one unit of each coefficient of m terms.
+
+        Those of a term that acts by the direction of arrival, which is another at each stop, are zero.
+        """
+        return np.concatenate([self._by_term(term) for term in terms.terms], axis=-1)
+
+    def uncorrected(self, terms: TermEstimates) -> Array:
+        """What of the coefficients (6 m,) the controller does not correct."""
+        corrected = np.concatenate([self.corrections.of(term.name) for term in terms.terms])
+        return np.asarray(terms.values - corrected)
+
+    def reversals(self, terms: TermEstimates | None) -> Iterator[Effect]:
+        """What is left of terms that act by the direction of arrival: another error at every stop."""
+        if terms is None:
+            return
+        left = self.uncorrected(terms)
+        for row, term in enumerate(terms.terms):
+            if term.needs_directions:
+                rows = slice(row * LEGS, (row + 1) * LEGS)
+                sigma = np.sqrt(np.diag(terms.covariance)[rows])
+                yield _at_every_stop(term, np.hypot(left[rows], sigma))
+
+    def _by_term(self, term: ModelTerm) -> Array:
+        if term.needs_directions:
+            return np.zeros((len(self.task), 6, LEGS))
+        at_task, over = (
+            term.pose_errors(placement, np.zeros((len(placement), LEGS)))
+            for placement in (self.task, self.workspace)
+        )
+        return self.frames.remove_frame_motion(self.task.poses, at_task, over)
+
     def _direct(self, effect: Effect) -> Array:
         """Errors (t, 6, k) by the effect itself; frames cannot be fitted to what differs at every stop."""
         if effect.on_poses is None or effect.occurrence is Occurrence.MEASURING:
@@ -155,6 +194,16 @@ class Propagation:
         if effect.occurrence in {Occurrence.EVERY_STOP, Occurrence.STOPS_AT_WORK}:
             return each_alone(errors)
         return self.frames.remove_frame_motion(self.task.poses, errors, effect.on_poses(self.workspace))
+
+
+def _at_every_stop(term: ModelTerm, sizes: Array) -> Effect:
+    """A term of some sizes (6,) where nobody knows from which side joints arrive."""
+
+    def columns(at: Placement) -> Array:
+        return term.pose_errors(at, np.ones((len(at), LEGS))) * sizes
+
+    at_work, source = Occurrence.STOPS_AT_WORK, "identified"
+    return Effect(f"{term.name} not corrected", 1.0, "", at_work, columns, source=source)
 
 
 def placement_of(belief: RobotBelief, poses: PoseBatch) -> Placement:

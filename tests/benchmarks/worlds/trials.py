@@ -111,7 +111,7 @@ def settings() -> tuple[Setting, ...]:
 
 
 def _judged(trial: Trial, world: World, found: Identification) -> Outcome:
-    own, stated = settings()[trial.number % ROBOTS], _settings_with_limit(trial)
+    own, stated = settings()[trial.number % ROBOTS], stated_limit(trial.limit_mm, trial.grade)
     written = world.robot.with_controller(world.robot.for_controller(found.geometry))
     hour = world.hours(own.commands, world.robot.commanding)
     says = _verified(stated, replace(world, robot=written), found, own, hour)
@@ -134,25 +134,25 @@ def _verified(
     settings: CellSettings, world: World, found: Identification, own: Setting, hour: float
 ) -> Verification:
     """By held-out records, and where a test of the model fails narrowly by confirming ones after them."""
-    records = _records(world, found, own.held_out, hour, HELD_OUT_FROM)
+    records = records_after(world, found, own.held_out, hour, HELD_OUT_FROM)
     deviations = [record.deviation for record in records.records if record.orientation > 1]
     held_out = HeldOut(records, deviations, deviations)
     says = verify(settings, world.robot, found, held_out)
     if not says.needs_confirmation:
         return says
     later = world.hours(own.held_out, found.geometry, hour)
-    records = _records(world, found, own.confirming, later, CONFIRMING_FROM)
+    records = records_after(world, found, own.confirming, later, CONFIRMING_FROM)
     return verify(settings, world.robot, found, replace(held_out, confirming=records))
 
 
-def _settings_with_limit(trial: Trial) -> CellSettings:
+def stated_limit(limit_mm: float, grade: Grade = "precision") -> CellSettings:
     """The cell of a machine of some grade, with a limit on the position alone."""
-    stated = budgets.settings_of(trial.grade)
-    limits = {"position_mm": trial.limit_mm, "orientation_deg": NO_LIMIT_DEG}
+    stated = budgets.settings_of(grade)
+    limits = {"position_mm": limit_mm, "orientation_deg": NO_LIMIT_DEG}
     return stated.model_copy(update={"acceptance": stated.acceptance.model_copy(update=limits)})
 
 
-def _records(
+def records_after(
     world: World, found: Identification, commands: Commands, hour: float, first: int
 ) -> MeasurementSet:
     """The records of commands with the identified geometry, at points after the ``first``."""

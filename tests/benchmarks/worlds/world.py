@@ -4,7 +4,7 @@ The controller computes with the product's geometry. The machine is closed by ot
 (:mod:`~tests.benchmarks.worlds.closure`), with whatever is off in it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -75,6 +75,8 @@ class World:
         truth: the geometry that it would have without its effects, in the convention's frames.
         seed: of all that is random.
         is_noisy: whether readings have the stated noise.
+        sent_further: what the controller adds to its joints (n, 6), mm, at some poses, for joints that come
+            from some directions.
     """
 
     robot: Robot
@@ -82,6 +84,7 @@ class World:
     effect: Effect
     seed: int
     is_noisy: bool = True
+    sent_further: Callable[[PoseBatch, Array, Array], Array] | None = None
 
     def records(self, commands: Commands, commanding: Geometry, start: float = 0.0) -> MeasurementSet:
         """The records of commands through a geometry; ``start`` is the hour of the first one.
@@ -89,7 +92,7 @@ class World:
         Raises:
             CannotCloseError: a command leads through a singularity.
         """
-        stops = self._stops(commands, commanding, start)
+        stops = self._corrected(self._stops(commands, commanding, start), commands.poses)
         stopped, poses = self._reached(stops, commanding, commands.poses)
         touched = poses.positions + self.effect.ball(stops, poses.rotations)
         random = np.random.default_rng([self.seed, 1, int(1e3 * start)])
@@ -120,7 +123,7 @@ class World:
 
     def reached(self, poses: PoseBatch, commanding: Geometry, start: float = 0.0) -> PoseBatch:
         """Where the machine goes for commands through a geometry."""
-        stops = self._stops(_one_point(poses), commanding, start)
+        stops = self._corrected(self._stops(_one_point(poses), commanding, start), poses)
         return self._reached(stops, commanding, poses)[1]
 
     def errors(
@@ -152,12 +155,19 @@ class World:
             seed=(self.seed, 3),
             at_work=True,
         )
-        reached = self._reached(stops, written, every)[1]
+        reached = self._reached(self._corrected(stops, every), written, every)[1]
         return [reached[slice(first, first + len(poses))] for first in range(0, len(every), len(poses))]
 
     def _stops(self, commands: Commands, commanding: Geometry, start: float) -> Stops:
         joints = slider_places(commanding, self.robot.branch, commands.poses)
         return Stops.of(commands.points, joints, start, (self.seed, 0, int(1e3 * start)))
+
+    def _corrected(self, stops: Stops, poses: PoseBatch) -> Stops:
+        """The stops of a controller that corrects what is not geometry."""
+        if self.sent_further is None:
+            return stops
+        further = self.sent_further(poses, stops.joints, stops.directions)
+        return replace(stops, joints=stops.joints + further, before=stops.before + further)
 
     def _reached(self, stops: Stops, commanding: Geometry, commands: PoseBatch) -> tuple[Array, PoseBatch]:
         """What the encoders show (n, 6), mm, and the poses of the platform."""

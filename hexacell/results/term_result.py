@@ -1,0 +1,84 @@
+"""What an identification found beside the geometry, as data, and what of it a controller is to correct."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from hexacell.cell.fields import Frozen
+from hexacell.cell.model import CellSettings
+from hexacell.identification.solver.result import Identification
+from hexacell.identification.terms.finding import Finding
+from hexacell.kinematics.corrections import NONE, Corrections, Six
+
+Numbers = tuple[float, float, float, float, float, float]
+
+
+class TermResult(Frozen):
+    """A term that was offered.
+
+    Attributes:
+        name: of the term.
+        finding: what the records say of it.
+        log_factor: logarithm of the Bayes factor.
+        predicted: by how much better points are predicted from the others with it, in the logarithm of the
+            density of their records; None where that was not asked.
+        rival: the term that it cannot be told from.
+        unit: of its coefficients.
+        values: coefficient of each joint or leg; None where it was not taken.
+        sigma: one standard deviation of each.
+    """
+
+    name: str
+    finding: Finding
+    log_factor: float
+    predicted: float | None = None
+    rival: str = ""
+    unit: str = ""
+    values: Numbers | None = None
+    sigma: Numbers | None = None
+
+    @property
+    def is_taken(self) -> bool:
+        """Whether the identification has it."""
+        return self.values is not None
+
+
+def term_results(found: Identification) -> tuple[TermResult, ...]:
+    """What was found of all terms that were offered."""
+    terms = {} if found.terms is None else {term.name: term for term in found.terms.terms}
+    results = []
+    for tried in found.tried_terms:
+        result = TermResult(
+            name=tried.name,
+            finding=tried.finding,
+            log_factor=tried.log_factor,
+            predicted=tried.predicted if tried.finding is not Finding.NOT_SHOWN else None,
+            rival=tried.rival,
+        )
+        if found.terms is not None and tried.name in terms:
+            values, sigma = found.terms.of(tried.name)
+            update = {"unit": terms[tried.name].unit, "values": _six(values), "sigma": _six(sigma)}
+            result = result.model_copy(update=update)
+        results.append(result)
+    return tuple(results)
+
+
+def _six(values: Iterable[float]) -> Six:
+    q1, q2, q3, q4, q5, q6 = (float(value) for value in values)
+    return q1, q2, q3, q4, q5, q6
+
+
+def corrections_for(results: Iterable[TermResult], settings: CellSettings) -> Corrections:
+    """What a controller corrects of the terms that were taken; weight and centre are the cell file's."""
+    values = {result.name: result.values for result in results if result.values is not None}
+    if not values:
+        return Corrections()
+    stated = settings.uncertainty
+    return Corrections(
+        backlash=values.get("backlash", NONE),
+        play_mm=values.get("play", NONE),
+        compliance_um_n=values.get("compliance", NONE),
+        weight_n=stated.own_weight_n,
+        weight_direction=stated.own_weight_direction,
+        weight_centre_mm=stated.own_weight_centre_mm,
+    )

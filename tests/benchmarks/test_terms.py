@@ -1,0 +1,175 @@
+"""Machines with backlash, play and compliance: identified and corrected they are as good as without.
+
+The bundled robot, 5 x 11 records, other equations (:mod:`tests.benchmarks.worlds`). A controller corrects
+what was found, as the identification has it; U and verdict are those of a run.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from hexacell.campaign.task_accuracy import Task
+from hexacell.errors import HexacellError
+from hexacell.identification.estimator import identify
+from hexacell.identification.placement import Placement
+from hexacell.identification.solver.result import Identification
+from hexacell.identification.terms.backlash import backlash
+from hexacell.identification.terms.compliance import compliance
+from hexacell.identification.terms.play import play
+from hexacell.kinematics.corrections import Corrections
+from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.rotations import Array
+from hexacell.robot.model import Robot
+from hexacell.verdict.decision import Verdict
+from hexacell.verdict.verification import HeldOut, verify
+from tests.benchmarks.figures import NEVER, at_least, at_most, least_by_chance
+from tests.benchmarks.machines import on_all_cores
+from tests.benchmarks.samples import sample
+from tests.benchmarks.worlds import budgets, encoders, legs
+from tests.benchmarks.worlds.effects import Effect, at_once
+from tests.benchmarks.worlds.trials import HELD_OUT_FROM, LIMIT_MM, records_after, settings, stated_limit
+from tests.benchmarks.worlds.world import World
+
+MACHINES = sample(__name__, "MACHINES")
+NEWTON, DOWN, CENTRE_MM = 100.0, np.array([0.0, 0.0, -1.0]), np.array([5.0, -3.0, 20.0])
+NOTHING = np.zeros(6)
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Sizes of what is not geometry: mm, mm and um/N; and the largest ratio of its error to none's."""
+
+    backlash: float = 0.0
+    play: float = 0.0
+    compliance: float = 0.0
+    at_most: float = 1.2
+
+    def drawn(self, random: np.random.Generator) -> dict[str, Array]:
+        """Coefficients of each joint or leg: between half of the size and all of it, or within 20 %."""
+        return {
+            "backlash": self.backlash * random.uniform(0.5, 1.0, 6),
+            "play": self.play * random.uniform(0.5, 1.0, 6),
+            "compliance": self.compliance * (1.0 + 0.2 * random.standard_normal(6)),
+        }
+
+
+MACHINES_OF_A_KIND = {
+    "none of them": Machine(at_most=1.05),
+    "play 0.1 mm": Machine(play=0.1),
+    "play 0.02 mm": Machine(play=0.02),
+    "backlash 0.1 mm": Machine(backlash=0.1),
+    "backlash 0.02 mm": Machine(backlash=0.02),
+    "compliance 0.3 um/N": Machine(compliance=0.3),
+    "play and compliance": Machine(play=0.1, compliance=0.3, at_most=1.4),
+    "all at a third": Machine(0.033, 0.033, 0.1, at_most=1.4),
+}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a machine: its true error, as stated, and which terms were taken."""
+
+    true_mm: float = np.nan
+    value_mm: float = np.nan
+    u_mm: float = np.nan
+    verdict: Verdict | None = None
+    taken: tuple[str, ...] = ()
+
+
+def effect_of(coefficients: Mapping[str, Array]) -> Effect:
+    """The machine by the worlds' own equations."""
+    return at_once(
+        encoders.hysteresis(0.5 * coefficients["backlash"]),
+        legs.play(0.5 * coefficients["play"], NEWTON * DOWN, CENTRE_MM),
+        legs.elastic(1e-3 * coefficients["compliance"], NEWTON * DOWN, CENTRE_MM),
+    )
+
+
+def offering(robot: Robot) -> Robot:
+    """A robot whose owner states the weight."""
+    base = robot.mechanism.normalize_frames(robot.drawing)[1].base
+    acts = base @ DOWN, CENTRE_MM
+    return replace(robot, terms=(backlash(0.1), play(0.1, *acts), compliance(0.3, NEWTON, *acts)))
+
+
+def sent_further(
+    robot: Robot, found: Identification, poses: PoseBatch, joints: Array, came: Array
+) -> Array:
+    """What a controller that corrects the found terms adds to its joints (n, 6), mm."""
+    if found.terms is None:
+        return np.zeros_like(joints)
+    at = Placement(robot.mechanism, robot.commanding, poses, joints)
+    errors = sum(term.leg_errors(at, came) * found.terms.of(term.name)[0] for term in found.terms.terms)
+    return np.asarray(-errors / at.derivatives.joints)
+
+
+def corrections(found: Identification) -> Corrections:
+    """The same as a config states it."""
+    values = (
+        {}
+        if found.terms is None
+        else {term.name: tuple(found.terms.of(term.name)[0].tolist()) for term in found.terms.terms}
+    )
+    named = {"backlash": "backlash", "play": "play_mm", "compliance": "compliance_um_n"}
+    return replace(Corrections(), **{named[name]: six for name, six in values.items()})
+
+
+def carried_out(machine: Machine, number: int) -> Outcome:
+    own = settings()[number % len(settings())]
+    coefficients = machine.drawn(np.random.default_rng([38, number]))
+    robot = offering(replace(own.robot, effects=budgets.machine("precision")))
+    world = World(robot, own.truth, effect_of(coefficients), number)
+    try:
+        found = identify(robot.problem(world.records(own.commands, robot.commanding)))
+        written = robot.with_controller(robot.for_controller(found.geometry))
+        after = replace(written, corrections=corrections(found))
+        corrected = replace(world, robot=after, sent_further=partial(sent_further, after, found))
+        hour = world.hours(own.commands, robot.commanding)
+        records = records_after(corrected, found, own.held_out, hour, HELD_OUT_FROM)
+        deviations = [record.deviation for record in records.records if record.orientation > 1]
+        says = verify(stated_limit(LIMIT_MM), after, found, HeldOut(records, deviations, deviations))
+    except HexacellError:
+        return Outcome()
+    belief = after.belief(found)
+    task = Task.of(own.cell.settings, after, belief).reachable(belief)
+    errors = corrected.errors(found.geometry, task.poses, task.workspace, hour)
+    accuracy = says.accuracy
+    return Outcome(
+        errors.largest_once_mm,
+        np.nan if accuracy is None else accuracy.position.value,
+        np.nan if accuracy is None else accuracy.position.expanded,
+        says.verdict,
+        () if found.terms is None else tuple(term.name for term in found.terms.terms),
+    )
+
+
+@pytest.fixture(scope="module")
+def perfect() -> list[Outcome]:
+    return on_all_cores(partial(carried_out, Machine()), range(MACHINES))
+
+
+@pytest.mark.parametrize("kind", MACHINES_OF_A_KIND)
+def test_what_is_not_geometry_is_found_and_corrected(figure, perfect, kind: str) -> None:
+    machine = MACHINES_OF_A_KIND[kind]
+    every = (
+        perfect
+        if machine == Machine(at_most=1.05)
+        else on_all_cores(partial(carried_out, machine), range(MACHINES))
+    )
+    known = [one for one in every if np.isfinite(one.true_mm)]
+    median, of_none = (np.nanmedian([one.true_mm for one in some]) for some in (every, perfect))
+    figure(f"{kind}: error if what was found is corrected", median, "mm")
+    figure(f"{kind}: over that of a machine without", median / of_none, "", at_most(machine.at_most))
+    figure(f"{kind}: identified and judged", len(known), f"of {MACHINES}", at_least(MACHINES))
+    passes = sum(one.verdict is Verdict.PASS for one in every)
+    figure(f"{kind}: passes", passes, f"of {MACHINES}")
+    covered = sum(abs(one.value_mm - one.true_mm) <= one.u_mm for one in known)
+    figure(f"{kind}: U covers", covered, f"of {len(known)}", at_least(least_by_chance(0.93, len(known))))
+    false = sum(one.verdict is Verdict.PASS and one.true_mm > LIMIT_MM for one in known)
+    figure(f"{kind}: false passes", false, "", NEVER)
+    if kind == "none of them":
+        taken = sum(bool(one.taken) for one in every)
+        figure(f"{kind}: a term is taken", taken, f"of {MACHINES}", at_most(max(1.0, 0.01 * MACHINES)))

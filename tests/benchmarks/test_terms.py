@@ -19,9 +19,9 @@ from hexacell.identification.solver.result import Identification
 from hexacell.identification.terms.backlash import backlash
 from hexacell.identification.terms.compliance import compliance
 from hexacell.identification.terms.play import play
-from hexacell.kinematics.corrections import Corrections
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
+from hexacell.results.term_result import corrections_for, term_results
 from hexacell.robot.model import Robot
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.verification import HeldOut, verify
@@ -106,17 +106,6 @@ def sent_further(
     return np.asarray(-errors / at.derivatives.joints)
 
 
-def corrections(found: Identification) -> Corrections:
-    """The same as a config states it."""
-    values = (
-        {}
-        if found.terms is None
-        else {term.name: tuple(found.terms.of(term.name)[0].tolist()) for term in found.terms.terms}
-    )
-    named = {"backlash": "backlash", "play": "play_mm", "compliance": "compliance_um_n"}
-    return replace(Corrections(), **{named[name]: six for name, six in values.items()})
-
-
 def carried_out(machine: Machine, number: int) -> Outcome:
     own = settings()[number % len(settings())]
     coefficients = machine.drawn(np.random.default_rng([38, number]))
@@ -125,7 +114,8 @@ def carried_out(machine: Machine, number: int) -> Outcome:
     try:
         found = identify(robot.problem(world.records(own.commands, robot.commanding)))
         written = robot.with_controller(robot.for_controller(found.geometry))
-        after = replace(written, corrections=corrections(found))
+        corrections = corrections_for(term_results(found), own.cell.settings)
+        after = replace(written, corrections=corrections)
         corrected = replace(world, robot=after, sent_further=partial(sent_further, after, found))
         hour = world.hours(own.commands, robot.commanding)
         records = records_after(corrected, found, own.held_out, hour, HELD_OUT_FROM)

@@ -45,8 +45,16 @@ SMALL: dict[str, Any] = FREE | {
 """As few poses as identify it, by dotted keys of the cell file."""
 
 
-FEW_CHOICES = SearchEffort(candidates=64, held_out_candidates=128, checked_candidates=8, checked_robots=4)
-"""Poses are chosen among few, and a plan is checked on few robots: what is chosen is not under test."""
+FEW_CHOICES = SearchEffort(
+    candidates=64,
+    held_out_candidates=128,
+    checked_candidates=8,
+    checked_robots=4,
+    rounds=(),
+    late_rounds=(),
+)
+"""Poses are chosen among few that nothing refines, and a plan is checked on few robots: what is chosen is
+not under test."""
 
 
 def changed(section: Any, changes: dict[str, Any]) -> Any:

@@ -43,7 +43,12 @@ from hexacell.__main__ import main
 from hexacell.design.search_effort import SearchEffort
 from hexacell.services import search_effort
 search_effort.EFFORT = SearchEffort(
-    candidates=64, held_out_candidates=128, checked_candidates=8, checked_robots=4
+    candidates=64,
+    held_out_candidates=128,
+    checked_candidates=8,
+    checked_robots=4,
+    rounds=(),
+    late_rounds=(),
 )
 sys.exit(main())
 """

@@ -72,6 +72,27 @@ def test_for_cron_a_line_is_printed_and_nothing_written(schedule, cell_folder, u
     assert not units.exists()
 
 
+def test_a_service_leaves_a_run_the_time_that_the_cell_file_gives_it(schedule, cell_folder, units) -> None:
+    given = '[unattended]\nquiet_hours = ["09:00-10:00"]\n'
+    cell_folder.cell.write_text(f"{cell_folder.cell.read_text()}\n{given}")
+    for stated, longest, tries in (
+        ("", 120, 4),
+        ("longest_minutes = 90", 120, 4),
+        ("longest_minutes = 600.5", 611, 2),
+        ("window_minutes = 60", 180, 1),
+        ("window_minutes = 60\nlongest_minutes = 300", 370, 1),
+    ):
+        cell_folder.edit((given, f"{given}{stated}\n"))
+        assert schedule("--daily", "02:30").code == 0
+        service = (units / UNITS[0]).read_text()
+        assert f"TimeoutStartSec={longest}min\n" in service
+        assert f"StartLimitBurst={tries}\n" in service
+        cell_folder.edit((f"{given}{stated}\n", given))
+    cell_folder.edit((given, f"{given}longest_minutes = 1430\n"))
+    refused = schedule("--daily", "02:30")
+    assert (refused.code, "it may last longer than a day" in refused.err) == (2, True)
+
+
 def test_units_of_others_are_left_alone(schedule, units) -> None:
     units.mkdir()
     other = units / UNITS[0]
@@ -95,9 +116,6 @@ def test_what_makes_no_sense_is_refused(schedule, units) -> None:
     for words, problem in (
         (["--daily", "25:00"], "'25:00' is no time of day"),
         ([], "the time of day is missing"),
-        (["--daily", "02:30", "--longest", "0"], "--longest 0 is no duration"),
-        (["--daily", "02:30", "--longest", "600"], "all tries together last longer than a day"),
-        (["--daily", "02:30", "--retries", "-1"], "--retries"),
         (["--daily", "02:30", "--on-failure", "a\nUser=root"], "is no name of a unit"),
         (["--daily", "02:30", "--cron", "--on-failure", "mail.service"], "only systemd"),
         (["--daily", "02:30", "--show"], "not allowed with"),

@@ -99,11 +99,11 @@ def test_a_schedule_leaves_the_run_its_window(typed_here, short_cell, tmp_path) 
     assert "is tried again every 10 minutes, for 60 minutes" in said
     assert "longer than 90.5 minutes goes back to its reference and ends" in said
     [service] = units.glob("*.service")
-    assert "TimeoutStartSec=161min" in service.read_text()
+    assert "TimeoutStartSec=180min" in service.read_text()
     assert "Restart=" not in service.read_text()
     refused = typed_here("schedule", short_cell.cell, "--daily", "05:30", "--folder", units)
     assert refused.code == ExitCode.USAGE
     assert "05:30 is in the quiet hours of the cell" in refused.err
     line = typed_here("schedule", short_cell.cell, "--daily", "02:30", "--cron")
-    assert "timeout --signal=TERM --kill-after=120 161m" in line.out
+    assert "timeout --signal=TERM --kill-after=120 180m" in line.out
     assert "the run tries again in its window" in line.out

@@ -98,20 +98,6 @@ def _schedule(commands: Any) -> None:  # noqa: ANN401
         help="check: change nothing (default); quick: correct what has drifted, optimise: recalibrate, "
         "and apply only within the limits",
     )
-    for option, default, meaning in (
-        ("--longest", 120, "stop a run in place after so long"),
-        ("--retry", 15, "wait before another try"),
-    ):
-        parser.add_argument(
-            option, type=int, default=default, metavar="MINUTES", help=f"{meaning} (default: %(default)s)"
-        )
-    parser.add_argument(
-        "--retries",
-        type=whole_number(0),
-        default=3,
-        metavar="N",
-        help="how often, where a device or the lock is not there (default: %(default)s)",
-    )
     parser.add_argument("--on-failure", metavar="UNIT", help="unit that systemd starts after a failure")
     add_file(parser, "--metrics", "write metrics of the cell there after each run")
     parser.add_argument("--cron", action="store_true", help="print a crontab line instead")

@@ -34,16 +34,7 @@ def main(options: argparse.Namespace, console: Console) -> ExitCode:
 
 
 def _write(cell: Cell, options: argparse.Namespace, console: Console) -> None:
-    run = scheduled_run(
-        cell,
-        options.daily,
-        options.mode,
-        longest_minutes=options.longest,
-        retry_minutes=options.retry,
-        retries=options.retries,
-        on_failure=options.on_failure,
-        metrics=options.metrics,
-    )
+    run = scheduled_run(cell, options.daily, options.mode, options.on_failure, options.metrics)
     stated = cell.settings.unattended
     if options.cron:
         if options.on_failure is not None:

@@ -9,13 +9,13 @@ import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from hexacell.errors import ExitCode, UsageError
 
 _TIME = re.compile(r"([01][0-9]|2[0-3]):([0-5][0-9])")
-MOST_MINUTES = 24 * 60
 STOPPING_S = 120
 """So long a run may take to stop the robot and to keep its journal before it is killed."""
 
@@ -31,8 +31,8 @@ class ScheduledRun:
         mode: ``check``, ``quick`` or ``optimise``.
         hour, minute: when it begins, in the computer's time zone.
         longest_minutes: after so long it is ended in place, and can be resumed.
-        retry_minutes: so long after a failure that may pass (a device, the lock) it is tried again.
-        retries: how often.
+        retries: how often it is tried again, each time after ``retry_minutes``, when a failure may pass (a
+            device, the lock).
         writable: the folders that it writes into: of the cell, of the controller's config, of metrics.
         metrics: the file that they are written to after each run, if any.
         on_failure: the unit that systemd starts after a failure, if any.
@@ -45,8 +45,8 @@ class ScheduledRun:
     hour: int
     minute: int
     longest_minutes: int
-    retry_minutes: int
     retries: int
+    retry_minutes: ClassVar[int] = 15
     writable: tuple[Path, ...]
     metrics: Path | None = None
     on_failure: str | None = None

@@ -8,15 +8,14 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
 
 from hexacell.cell.loader import Cell
-from hexacell.cell.operation import DAY_MINUTES, UnattendedSettings
+from hexacell.cell.operation import DAY_MINUTES
 from hexacell.errors import FileError, UsageError
 from hexacell.services.schedule.scheduled_run import (
-    MOST_MINUTES,
     ScheduledRun,
     cell_of,
     service_text,
@@ -31,8 +30,13 @@ DEVICE_GROUPS = ("dialout",)
 """Who may open serial lines, on Debian and its like; named where it exists."""
 
 VERIFYING_S = 20.0
+LONGEST_MINUTES = 120.0
+"""Longest duration of a run that states no longer one itself."""
+
 SPARE_MINUTES = 10.0
 """Beside its longest duration, for a run to go back to its reference."""
+
+MOST_RETRIES = 3
 _UNIT_NAME = re.compile(r"[A-Za-z0-9:_.@%\\-]+\.[a-z]+")
 
 
@@ -52,22 +56,27 @@ class Schedule:
 
 
 def scheduled_run(
-    cell: Cell,
-    daily: str,
-    mode: str,
-    *,
-    longest_minutes: int,
-    retry_minutes: int,
-    retries: int,
-    on_failure: str | None,
-    metrics: Path | None,
+    cell: Cell, daily: str, mode: str, on_failure: str | None, metrics: Path | None
 ) -> ScheduledRun:
     """What is to be started, each day at the time ``daily``; ``on_failure`` is the unit of a failure.
 
+    What the cell file says of window and longest duration the run itself keeps: a service must leave it the
+    time for that, and does not try again what was tried for a whole window.
+
     Raises:
-        UsageError: it cannot run without a person, or a number or the time makes no sense.
+        UsageError: it cannot run without a person, or in a day, or something given makes no sense.
     """
     hour, minute = time_of_day(daily)
+    stated = cell.settings.unattended
+    own_minutes = 0.0 if stated.longest_minutes is None else stated.longest_minutes + SPARE_MINUTES
+    longest_minutes = ceil(stated.window_minutes + max(LONGEST_MINUTES, own_minutes))
+    tries = DAY_MINUTES // (longest_minutes + ScheduledRun.retry_minutes)
+    if not tries:
+        raise UsageError(
+            "it may last longer than a day",
+            subject=cell.path,
+            action="Lower window_minutes or longest_minutes in [unattended]",
+        )
     path, metrics = cell.path.resolve(), metrics and metrics.resolve()
     folders = (path.parent, *(config.resolve().parent for config in cell.config_paths))
     run = ScheduledRun(
@@ -78,17 +87,13 @@ def scheduled_run(
         hour=hour,
         minute=minute,
         longest_minutes=longest_minutes,
-        retry_minutes=retry_minutes,
-        retries=retries,
+        retries=0 if stated.window_minutes else min(MOST_RETRIES, tries - 1),
         writable=tuple(dict.fromkeys((*folders, *([] if metrics is None else [metrics.parent])))),
         metrics=metrics,
         on_failure=on_failure,
     )
     _require_possible(cell, run)
     _require_not_quiet(cell, hour, minute)
-    run = _within_hours(cell.settings.unattended, run)
-    if (run.retries + 1) * (run.longest_minutes + retry_minutes) > MOST_MINUTES:
-        raise UsageError("all tries together last longer than a day", action="Lower --longest or --retries")
     return run
 
 
@@ -158,29 +163,12 @@ def _require_possible(cell: Cell, run: ScheduledRun) -> None:
         )
     if not str(run.cell).isprintable():
         raise UsageError("a path with control characters cannot be scheduled", subject=cell.path)
-    for what, minutes in (("longest", run.longest_minutes), ("retry", run.retry_minutes)):
-        if not 1 <= minutes <= MOST_MINUTES:
-            action = f"Give 1 to {MOST_MINUTES} minutes"
-            raise UsageError(f"--{what} {minutes} is no duration", action=action)
     if run.metrics is not None and not run.metrics.parent.is_dir():
         raise UsageError("the folder of the metrics does not exist", subject=run.metrics, action="Make it")
     if run.on_failure is not None and not _UNIT_NAME.fullmatch(run.on_failure):
         raise UsageError(
             f"'{run.on_failure}' is no name of a unit", action="Write it as mail-me@%n.service"
         )
-
-
-def _within_hours(stated: UnattendedSettings, run: ScheduledRun) -> ScheduledRun:
-    """The run with the time and the tries that the hours of the cell leave for the service.
-
-    What the cell file says of window and longest duration the run itself keeps: a service must leave it the
-    time for that, and does not try again what was tried for a whole window.
-    """
-    if stated.window_minutes <= 0.0 and stated.longest_minutes is None:
-        return run
-    needed = stated.window_minutes + (stated.longest_minutes or run.longest_minutes) + SPARE_MINUTES
-    retries = 0 if stated.window_minutes > 0.0 else run.retries
-    return replace(run, longest_minutes=max(run.longest_minutes, ceil(needed)), retries=retries)
 
 
 def _require_not_quiet(cell: Cell, hour: int, minute: int) -> None:

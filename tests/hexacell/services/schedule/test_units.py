@@ -30,7 +30,7 @@ def scheduled(
 ) -> ScheduledRun:
     path = Path(cell)
     program = ("/usr/bin/python3", "-m", "hexacell")
-    return ScheduledRun(path, name, program, "check", 2, 30, 120, 15, retries, (path.parent,))
+    return ScheduledRun(path, name, program, "check", 2, 30, 120, retries, (path.parent,))
 
 
 def settings_of(unit: str) -> dict[str, str]:

@@ -12,9 +12,12 @@ from typing import ClassVar, Literal, Self
 from pydantic import ValidationError, model_validator
 
 from hexacell.cell.fields import Frozen, GeometryDocument, first_mistake
+from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import ConfigLayout, Contents, fingerprint_of, names_of, read_contents
 from hexacell.errors import FileError, HexacellError
+from hexacell.kinematics.corrections import NO_CORRECTIONS, CorrectionChange, Corrections
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.parameters import JointUnit
 from hexacell.storage import atomic_files
 
 
@@ -57,7 +60,7 @@ class ConfigChange(JsonRecord):
     """A new geometry for a controller, and the exact text that it puts into the config.
 
     It holds everything that a person reviews and everything that a commit needs. What is written is what
-    was approved, even if the program restarts in between.
+    was approved, even if the program restarts in between. ``joint_unit`` is that of the corrected backlash.
     """
 
     noun: ClassVar[str] = "config change"
@@ -71,6 +74,9 @@ class ConfigChange(JsonRecord):
     text_before: str
     text_after: str
     further: tuple[FileChange, ...] = ()
+    corrections_before: Corrections = NO_CORRECTIONS
+    corrections_after: Corrections = NO_CORRECTIONS
+    joint_unit: JointUnit = JointUnit.MM
 
     @model_validator(mode="after")
     def _texts_are_whole(self) -> Self:
@@ -102,23 +108,34 @@ class ConfigChange(JsonRecord):
         """The exact change of the text, file by file."""
         return diff_of_files(self.paths, self.before_contents, self.after_contents)
 
+    @property
+    def changed_corrections(self) -> tuple[CorrectionChange, ...]:
+        """The numbers of the corrections that it changes."""
+        return self.corrections_before.changes_to(self.corrections_after, self.joint_unit)
+
 
 def propose(
-    paths: Sequence[Path], layout: ConfigLayout, after: Geometry, *, fingerprint_at_start: str
+    paths: Sequence[Path],
+    layout: ConfigLayout,
+    after: Geometry,
+    corrections: Corrections | None = None,
+    *,
+    fingerprint_at_start: str,
 ) -> ConfigChange:
     """The change that gives the controller the geometry ``after``, mm; nothing is written.
 
-    ``fingerprint_at_start`` is the :func:`~hexacell.config.layout.fingerprint` of the config
-    when the run began: the measurements were commanded with that geometry and are meaningless with another.
+    Without ``corrections`` it keeps those that it has. ``fingerprint_at_start`` is the
+    :func:`~hexacell.config.layout.fingerprint` of the config when the run began: the measurements were
+    commanded with that geometry and are meaningless with another.
 
     Raises:
-        FileError: the config changed since, or is invalid.
+        FileError: the config changed since, is invalid, or has no place for ``corrections``.
     """
     contents = read_contents(paths)
     require_fingerprint(paths[0], contents, fingerprint_at_start)
-    before = layout.read(*paths).geometry
+    before = layout.read(*paths)
     texts = [atomic_files.decode_utf8(data, path) for data, path in zip(contents, paths, strict=True)]
-    new = layout.rewrite(texts, after)
+    new = layout.rewrite(texts, after, corrections)
     first, *further = (
         FileChange(path=path.absolute(), format=one.name, text_before=old, text_after=text)
         for path, one, old, text in zip(paths, layout.formats, texts, new, strict=True)
@@ -126,13 +143,16 @@ def propose(
     return ConfigChange(
         path=first.path,
         format=first.format,
-        before=before.document(),
+        before=before.geometry.document(),
         after=after.document(),
         sha256_before=fingerprint_at_start,
         sha256_after=fingerprint_of(tuple(text.encode() for text in new)),
         text_before=first.text_before,
         text_after=first.text_after,
         further=tuple(further),
+        corrections_before=before.corrections,
+        corrections_after=before.corrections if corrections is None else corrections,
+        joint_unit=layout.joint_unit,
     )
 
 
@@ -239,7 +259,7 @@ class Receipt(JsonRecord):
 
 @dataclass(frozen=True, slots=True)
 class NumberVersions:
-    """One number of the geometry in three versions of a config, in its unit.
+    """One number of the geometry or of the corrections in three versions of a config, in its unit.
 
     ``now`` is None where the current config has no geometry that can be read.
     """
@@ -285,10 +305,10 @@ class ConfigEditedSince(FileError):
 def compare_versions(
     paths: tuple[Path, ...],
     layout: ConfigLayout,
-    before: tuple[Geometry, Contents],
-    written: tuple[Geometry, Contents],
+    before: tuple[ControllerGeometry, Contents],
+    written: tuple[ControllerGeometry, Contents],
 ) -> ConfigVersions:
-    """Compare the config in these files with two versions of it, each a geometry and what the files held.
+    """Compare the config in these files with two versions of it, each as read and what the files held.
 
     Raises:
         FileError: a file cannot be read.
@@ -296,18 +316,39 @@ def compare_versions(
     now = read_contents(paths)
     edits = [diff_of_files(paths, version, now) for _, version in (before, written)]
     is_from_written = len(edits[1]) <= len(edits[0])
-    parameters = before[0].parameters.parameters
-    geometry = geometry_if_readable(paths, layout)
-    last = [None] * len(parameters) if geometry is None else geometry.vector.tolist()
-    values = zip(parameters, before[0].vector.tolist(), written[0].vector.tolist(), last, strict=True)
-    found = (NumberVersions(one.name, one.kind.unit.value, *three) for one, *three in values)
+    old, new = (numbers_of(version, layout) for version, _ in (before, written))
+    current = config_if_readable(paths, layout)
+    last = None if current is None else numbers_of(current, layout)
+    units = {name: unit for every in (old, new, last or {}) for name, (unit, _) in every.items()}
+    found = (
+        NumberVersions(
+            name,
+            unit,
+            old.get(name, (unit, 0.0))[1],
+            new.get(name, (unit, 0.0))[1],
+            None if last is None else last.get(name, (unit, 0.0))[1],
+        )
+        for name, unit in units.items()
+    )
     numbers = tuple(one for one in found if len({one.before, one.written, one.now}) > 1)
     return ConfigVersions(numbers, edits[is_from_written], is_from_written)
 
 
-def geometry_if_readable(paths: tuple[Path, ...], layout: ConfigLayout) -> Geometry | None:
-    """The geometry in the files; None where it cannot be read."""
+def numbers_of(config: ControllerGeometry, layout: ConfigLayout) -> dict[str, tuple[str, float]]:
+    """Unit and value of each number of a config, by its name: the geometry's, then the corrections'."""
+    geometry = config.geometry
+    found = {
+        one.name: (str(one.kind.unit), value)
+        for one, value in zip(geometry.parameters.parameters, geometry.vector.tolist(), strict=True)
+    }
+    return found | {
+        name: (unit, value) for name, unit, value in config.corrections.numbers(layout.joint_unit)
+    }
+
+
+def config_if_readable(paths: tuple[Path, ...], layout: ConfigLayout) -> ControllerGeometry | None:
+    """What the files state; None where they cannot be read."""
     try:
-        return layout.read(*paths).geometry
+        return layout.read(*paths)
     except HexacellError:
         return None

@@ -13,7 +13,7 @@ import numpy as np
 
 from hexacell.cell.fields import LARGEST_NUMBER, Frozen
 from hexacell.errors import FileError
-from hexacell.kinematics.corrections import NO_CORRECTIONS, Corrections
+from hexacell.kinematics.corrections import NO_CORRECTIONS, CorrectionKind, Corrections
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
 
@@ -56,13 +56,14 @@ class ControllerGeometry:
     """The geometry that a controller uses, as its config states it, and the branch of the robot if any.
 
     ``limits`` are those that the config has, if any; ``corrections`` are what the controller adds to its
-    inverse kinematics.
+    inverse kinematics, and ``holds`` are the kinds of these that its files have a place for.
     """
 
     geometry: Geometry
     branch: Branch
     limits: ControllerLimits = field(default=ControllerLimits())
     corrections: Corrections = NO_CORRECTIONS
+    holds: frozenset[CorrectionKind] = frozenset()
 
 
 class ConfigFormat(Protocol):
@@ -124,6 +125,42 @@ class PartFormat(Protocol):
             FileError: it has one of them not, or cannot hold its value.
         """
 
+
+@dataclass(frozen=True, slots=True)
+class HeldCorrections:
+    """The corrections in one file, and the kinds of these that it has a place for."""
+
+    corrections: Corrections = NO_CORRECTIONS
+    kinds: frozenset[CorrectionKind] = frozenset()
+
+
+@runtime_checkable
+class CorrectionsFormat(Protocol):
+    """A format whose files may have corrections beside a geometry, or beside a part of it.
+
+    Attributes:
+        holds: the kinds of corrections that such a file can have.
+    """
+
+    holds: frozenset[CorrectionKind]
+
+    def read_corrections(self, text: str, source: Path | None) -> HeldCorrections:
+        """What a text has; ``source`` is what errors name.
+
+        Raises:
+            FileError: with the line of a number that is none, or not physical.
+        """
+
+    def rewrite_corrections(self, text: str, corrections: Corrections) -> str:
+        """``text`` with all numbers of ``corrections``; numbers that are absent are added.
+
+        Raises:
+            FileError: it cannot hold them.
+        """
+
+
+LARGEST_BACKLASH, LARGEST_PLAY_MM, LARGEST_COMPLIANCE_UM_N = 5.0, 5.0, 100.0
+"""No machine that is worth calibrating has more."""
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 """A decimal number as C, HAL and most controllers read it."""

@@ -6,7 +6,7 @@ and the zeros of the legs in the INI file. Each parameter is looked for in every
 
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from pathlib import Path
 
@@ -16,13 +16,16 @@ from hexacell.config.interface import (
     ConfigPart,
     ControllerGeometry,
     ControllerLimits,
+    CorrectionsFormat,
+    HeldCorrections,
     PartFormat,
     require_physical,
 )
 from hexacell.errors import FileError
+from hexacell.kinematics.corrections import NO_CORRECTIONS, CorrectionKind, Corrections
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
-from hexacell.kinematics.parameters import ParameterSet
+from hexacell.kinematics.parameters import JointUnit, ParameterSet
 from hexacell.storage import atomic_files
 
 
@@ -44,14 +47,32 @@ class ConfigLayout:
 
     parameters: ParameterSet
     formats: tuple[FormatOfFile, ...]
+    joint_unit: JointUnit = JointUnit.MM
+
+    @property
+    def holds(self) -> frozenset[CorrectionKind]:
+        """The kinds of corrections that files of these formats can have.
+
+        Whether the files at hand have a place for them, :attr:`.ControllerGeometry.holds` says.
+        """
+        every = (one.reader for one in self.formats)
+        return frozenset().union(*(one.holds for one in every if isinstance(one, CorrectionsFormat)))
 
     def read(self, *paths: Path) -> ControllerGeometry:
-        """The geometry in the files.
+        """The geometry in the files, and the corrections.
 
         Raises:
             FileError: with file and line: a file is absent, unreadable or no such config, or a parameter is
                 in none of the files, or in two.
         """
+        found = self._read_geometry(paths)
+        if not self.holds:
+            return found
+        texts = [atomic_files.read_text(path, LARGEST_CONFIG_BYTES) for path in paths]
+        corrections, places = self._corrections(texts, paths)
+        return replace(found, corrections=corrections, holds=frozenset(places))
+
+    def _read_geometry(self, paths: Sequence[Path]) -> ControllerGeometry:
         if len(self.formats) == 1:
             [path] = paths
             return self.formats[0].reader.read(path)
@@ -64,23 +85,78 @@ class ConfigLayout:
             limits,
         )
 
-    def rewrite(self, texts: Sequence[str], geometry: Geometry) -> tuple[str, ...]:
-        """The texts with the values of ``geometry``; every other character of them is kept.
+    def rewrite(
+        self, texts: Sequence[str], geometry: Geometry, corrections: Corrections | None = None
+    ) -> tuple[str, ...]:
+        """The texts with the values of ``geometry`` and ``corrections``; every other character is kept.
+
+        Without ``corrections`` they stay as they are.
 
         Raises:
-            FileError: a text is no such config, or cannot hold its part of ``geometry``.
+            FileError: a text is no such config, or cannot hold its part of these.
         """
+        new = self._with_geometry(texts, geometry)
+        return new if corrections is None else self._with_corrections(new, corrections)
+
+    def _with_geometry(self, texts: Sequence[str], geometry: Geometry) -> tuple[str, ...]:
         if len(self.formats) == 1:
             [text] = texts
             return (self.formats[0].reader.rewrite(text, geometry),)
         require_physical(geometry)
         values = dict(zip(self.parameters.names, geometry.vector.tolist(), strict=True))
         parts = self._parts(texts, [None] * len(texts))
-        self._values(parts, [Path(f"file {number}") for number, _ in enumerate(texts, start=1)])
+        self._values(parts, self._stand_ins)
         return tuple(
             one.rewrite_part(text, {name: values[name] for name in part.values})
             for one, text, part in zip(self._part_formats, texts, parts, strict=True)
         )
+
+    def _with_corrections(self, texts: Sequence[str], corrections: Corrections) -> tuple[str, ...]:
+        found, places = self._corrections(texts, self._stand_ins)
+        for kind in CorrectionKind:
+            if kind not in places and corrections.of(kind) != found.of(kind):
+                raise FileError(
+                    f"the controller's config has no place for corrections of {kind}",
+                    action="Nothing was written; name the file that has it in [[controller.further_files]]",
+                )
+        new = list(texts)
+        for place in {*places.values()}:
+            kinds = [kind for kind, where in places.items() if where == place]
+            reader = self.formats[place].reader
+            assert isinstance(reader, CorrectionsFormat)  # noqa: S101 - it has a place for them
+            new[place] = reader.rewrite_corrections(new[place], NO_CORRECTIONS.taking(corrections, kinds))
+        return tuple(new)
+
+    def _corrections(
+        self, texts: Sequence[str], paths: Sequence[Path]
+    ) -> tuple[Corrections, Mapping[CorrectionKind, int]]:
+        """The corrections in all texts, and which of these has a place for each kind.
+
+        Raises:
+            FileError: two have numbers of the same kind.
+        """
+        held = [
+            one.reader.read_corrections(text, path)
+            if isinstance(one.reader, CorrectionsFormat)
+            else HeldCorrections()
+            for one, text, path in zip(self.formats, texts, paths, strict=True)
+        ]
+        found, places = NO_CORRECTIONS, dict[CorrectionKind, int]()
+        for kind in CorrectionKind:
+            having = [place for place, one in enumerate(held) if any(one.corrections.of(kind))]
+            if len(having) > 1:
+                raise _not_in_one(kind, [paths[place] for place in having], paths)
+            able = [place for place, one in enumerate(held) if kind in one.kinds]
+            for place in (having or able)[:1]:
+                found = found.taking(held[place].corrections, [kind])
+                if place in able:
+                    places[kind] = place
+        return found, places
+
+    @property
+    def _stand_ins(self) -> list[Path]:
+        """What errors call texts that are in no files."""
+        return [Path(f"file {number}") for number, _ in enumerate(self.formats, start=1)]
 
     @property
     def _part_formats(self) -> Iterator[PartFormat]:

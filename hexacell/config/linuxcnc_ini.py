@@ -6,7 +6,11 @@
     L6 = 700.0
 
 HAL reads them by ``setp hexaglidekins.s1x [HEXAGLIDE]S1X``. Limits of joints and axes in the same file
-(``[JOINT_0] MIN_LIMIT``, ``[AXIS_X] MAX_LIMIT``) hold as well.
+(``[JOINT_0] MIN_LIMIT``, ``[AXIS_X] MAX_LIMIT``) hold as well, and ``[JOINT_0] BACKLASH``.
+
+To what it sends a motor LinuxCNC adds half of the joint's ``BACKLASH`` while the joint moves up, takes as
+much away while it moves down, and keeps it while the joint stands; what it reports is without that
+(``motion/control.c``, ``compute_screw_comp``). A joint with a ``COMP_FILE`` does not use it.
 
 LinuxCNC looks for a variable in the first section of that name alone and takes the first one there; names
 are case-sensitive; what stands behind the number belongs to the value, comments too; a backslash at the end
@@ -18,22 +22,28 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from math import ceil, log10
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from pydantic import Field
 
 from hexacell.cell.fields import LARGEST_NUMBER, Text
 from hexacell.config.interface import (
+    LARGEST_BACKLASH,
     LARGEST_CONFIG_BYTES,
     ControllerLimits,
+    HeldCorrections,
     NumberToken,
     Range,
     number_of,
+    replace_tokens,
     token_error,
+    write_number,
 )
 from hexacell.config.keyed_config import KeyedConfig, KeyedOptions, NumberLookup, options_of
 from hexacell.errors import FileError
+from hexacell.kinematics.corrections import CorrectionKind, Corrections, Six
 from hexacell.kinematics.parameters import LEGS, ParameterSet
 from hexacell.storage import atomic_files
 
@@ -47,6 +57,8 @@ class LinuxcncIniOptions(KeyedOptions):
 class LinuxcncIni(KeyedConfig):
     """A :class:`~hexacell.config.interface.ConfigFormat`; raises ``UsageError`` for options."""
 
+    holds = frozenset({CorrectionKind.BACKLASH})
+
     def __init__(
         self, parameters: ParameterSet, given: Mapping[str, Any], *, is_part: bool = False
     ) -> None:
@@ -59,6 +71,32 @@ class LinuxcncIni(KeyedConfig):
             lambda text, path: limits_in(text, path, options.unit_mm),
             is_part=is_part,
         )
+
+    def read_corrections(self, text: str, source: Path | None) -> HeldCorrections:
+        """The backlash of the joints in the text; raises ``FileError`` with the line."""
+        ini = IniText(text, source, "")
+        found = [_backlash(ini, joint, self._unit_mm) for joint in JOINTS]
+        has_place = all(ini.has_section(joint) and not ini.has(f"{joint}/{COMP_FILE}") for joint in JOINTS)
+        backlash = cast("Six", tuple(found))
+        return HeldCorrections(Corrections(backlash), self.holds if has_place else frozenset())
+
+    def rewrite_corrections(self, text: str, corrections: Corrections) -> str:
+        """``text`` with another backlash; a variable that is absent becomes the last one of its section.
+
+        Raises:
+            FileError: it reads back with another number.
+        """
+        new = text
+        for joint, wanted in zip(JOINTS, corrections.backlash, strict=True):
+            new = _with_backlash(IniText(new, None, ""), joint, self._unit_mm, wanted)
+        after = self.read_corrections(new, None).corrections.backlash
+        for joint, found, wanted in zip(JOINTS, after, corrections.backlash, strict=True):
+            if abs(found - wanted) > 10.0**-BACKLASH_DECIMALS:
+                raise FileError(
+                    f"the new backlash of [{joint}] reads back with another number",
+                    action="Nothing was written; please report this with the config",
+                )
+        return new
 
 
 SEPARATOR = "/"
@@ -128,6 +166,25 @@ class IniText:
         """Whether there is such a section with a variable in it."""
         return any(one.section == name for one in self._variables)
 
+    def with_variable(self, section: str, line: str) -> str:
+        """The text with another line behind the last variable that LinuxCNC sees in a section.
+
+        Raises:
+            FileError: there is no such section.
+        """
+        lines = [
+            self.text[: self.text.find("\n", one.token.end) + 1 or len(self.text)]
+            for one in self._variables
+            if one.section == section and one.hidden is None
+        ]
+        # A line that ends with a backslash would swallow the next one.
+        places = [first for first in lines if not first.endswith((CONTINUED, f"{CONTINUED}\n"))]
+        if not places:
+            raise FileError(f"there is no section [{section}]", subject=self.source, action="Add it")
+        first, end = places[-1], "\r\n" if "\r\n" in self.text else "\n"
+        gap = "" if first.endswith("\n") else end
+        return "".join((first, gap, line, end, self.text[len(first) :]))
+
     def _missing(self, section: str, name: str, found: list[_Variable]) -> FileError:
         for token, (why, action) in ((one.token, one.hidden) for one in found if one.hidden):
             problem = f"LinuxCNC does not see [{section}] {name}: {why}"
@@ -164,6 +221,36 @@ class IniText:
             start += len(content) + 1
 
 
+JOINTS = tuple(f"JOINT_{leg}" for leg in range(LEGS))
+BACKLASH, COMP_FILE = "BACKLASH", "COMP_FILE"
+BACKLASH_DECIMALS = 6
+"""1 nm, and less in a larger unit."""
+
+
+def _backlash(ini: IniText, joint: str, unit_mm: float) -> float:
+    """The backlash that LinuxCNC uses of a joint, in mm or deg."""
+    key = f"{joint}/{BACKLASH}"
+    if not ini.has(key):
+        return 0.0
+    token = ini.number(key)
+    value = number_of(token, ini.source) * (1.0 if _turns(ini, joint) else unit_mm)
+    if abs(value) > LARGEST_BACKLASH:
+        problem = f"{BACKLASH} of [{joint}] is {token.text}, more than a machine can have"
+        raise token_error(token, problem, ini.source, "Correct it")
+    return 0.0 if ini.has(f"{joint}/{COMP_FILE}") else value
+
+
+def _with_backlash(ini: IniText, joint: str, unit_mm: float, wanted: float) -> str:
+    """The text with another backlash of a joint, if it is another by half of its last decimal."""
+    if abs(wanted - _backlash(ini, joint, unit_mm)) <= 0.5 * 10.0**-BACKLASH_DECIMALS:
+        return ini.text
+    unit = 1.0 if _turns(ini, joint) else unit_mm
+    number = write_number(wanted / unit, BACKLASH_DECIMALS + max(0, ceil(log10(unit))))
+    if ini.has(f"{joint}/{BACKLASH}"):
+        return replace_tokens(ini.text, {ini.number(f"{joint}/{BACKLASH}"): number})
+    return ini.with_variable(joint, f"{BACKLASH} = {number}")
+
+
 LINEAR, ANGULAR = "XYZ", "ABC"
 ROTARY_JOINT = "ANGULAR"
 
@@ -182,10 +269,7 @@ def limits_of_ini(path: Path, unit_mm: float = 1.0) -> ControllerLimits:
 
 def limits_in(ini: NumberLookup, source: Path | None, unit_mm: float) -> ControllerLimits:
     """The limits in a text that was read from ``source``."""
-    joints = [
-        _range(ini, section, 1.0 if _turns(ini, section) else unit_mm, source)
-        for section in (f"JOINT_{leg}" for leg in range(LEGS))
-    ]
+    joints = [_range(ini, section, 1.0 if _turns(ini, section) else unit_mm, source) for section in JOINTS]
     axes = [
         *(_range(ini, f"AXIS_{axis}", unit_mm, source) for axis in LINEAR),
         *(_range(ini, f"AXIS_{axis}", 1.0, source) for axis in ANGULAR),

@@ -10,8 +10,8 @@
     min = -800.0
     max = 200.0
 
-The file belongs to the robot's owner. A write-back changes the numbers of the geometry and no other
-character.
+and ``[corrections]`` (:mod:`~hexacell.config.toml_corrections`). The file belongs to the robot's owner. A
+write-back changes the numbers of the geometry and of the corrections, and no other character.
 """
 
 from collections.abc import Mapping
@@ -28,11 +28,14 @@ from hexacell.config.interface import (
     ConfigPart,
     ControllerGeometry,
     ControllerLimits,
+    HeldCorrections,
     JointRanges,
     require_physical,
     write_number,
 )
+from hexacell.config.toml_corrections import read_corrections, with_corrections
 from hexacell.errors import FileError, UsageError
+from hexacell.kinematics.corrections import CorrectionKind, Corrections
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
 from hexacell.kinematics.parameters import LEGS, ParameterKind, ParameterSet
@@ -46,6 +49,8 @@ class NativeToml:
     Raises:
         UsageError: options are given; it has none.
     """
+
+    holds = frozenset(CorrectionKind)
 
     def __init__(
         self,
@@ -108,6 +113,14 @@ class NativeToml:
         """``text`` with these values, of all parameters of some kinds, as :meth:`rewrite` writes them."""
         there = self._kinds_in(TomlDocument.parse(text))
         return NativeToml(there).rewrite(text, Geometry(there, [values[name] for name in there.names]))
+
+    def read_corrections(self, text: str, source: Path | None) -> HeldCorrections:
+        """``[corrections]``, if there is any; raises ``FileError`` with the line."""
+        return HeldCorrections(read_corrections(TomlDocument.parse(text, source)), self.holds)
+
+    def rewrite_corrections(self, text: str, corrections: Corrections) -> str:
+        """``text`` with these corrections, with as many decimals as they need; raises ``FileError``."""
+        return with_corrections(text, corrections)
 
     def _kinds_in(self, document: TomlDocument) -> ParameterSet:
         section = document.data.get("geometry")

@@ -17,13 +17,15 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from hexacell.cell.fields import LONGEST_TEXT, Finite, Frozen, Text
-from hexacell.config.change import geometry_if_readable
+from hexacell.config.change import config_if_readable, numbers_of
+from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import ConfigLayout, fingerprint
 from hexacell.errors import FileError, HexacellError, UsageError
-from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.parameters import ParameterUnit
 from hexacell.runs.cell_lock import user_name
 from hexacell.storage import atomic_files
 
@@ -46,7 +48,7 @@ class WriteKind(StrEnum):
 
 
 class NumberChange(Frozen):
-    """One number of a geometry, and by how much it changed, in its unit."""
+    """One number of a geometry or of the corrections, and by how much it changed, in its unit."""
 
     name: str
     change: Finite
@@ -62,8 +64,8 @@ class WriteRecord(Frozen):
         user, host: whose process wrote it, and on which computer; empty where no record was kept then.
         run: the name of the run whose geometry was written or undone; empty where there is none.
         files: of the config, the first one first.
-        numbers_changed, largest: how many numbers of the geometry changed, and the one that changed most (a
-            milliradian counts as a millimetre); None where that is not known.
+        numbers_changed, largest: how many numbers of the geometry and the corrections changed, and the one
+            that changed most (a milliradian counts as a millimetre); None where that is not known.
         why: what the program knows of the cause.
         reason: what the person gave as one.
     """
@@ -131,7 +133,7 @@ def recorded_write(
         after = _version(paths, layout)
         if after[0] != before[0]:
             atomic_files.create_folder_durably(folder)
-            line = _record(paths, before, after, cause).model_dump_json().encode()
+            line = _record(paths, before, after, cause, layout).model_dump_json().encode()
             append_line(folder / RECORDS, line)
     except (HexacellError, OSError, ValueError) as error:
         recording.problem = f"The config is written, but the history has no record of it: {error}"
@@ -154,19 +156,21 @@ def read_records(folder: Path) -> tuple[tuple[WriteRecord, ...], tuple[int, ...]
     return tuple(records), tuple(damaged)
 
 
-_Version = tuple[str, Geometry | None]
+_Version = tuple[str, ControllerGeometry | None]
 
 
 def _version(paths: tuple[Path, ...], layout: ConfigLayout) -> _Version:
-    """The fingerprint of a config now, and its geometry; empty and None where it cannot be read."""
+    """The fingerprint of a config now, and what it states; empty and None where it cannot be read."""
     try:
-        return fingerprint(*paths), geometry_if_readable(paths, layout)
+        return fingerprint(*paths), config_if_readable(paths, layout)
     except FileError:
         return "", None
 
 
-def _record(paths: tuple[Path, ...], before: _Version, after: _Version, cause: WriteCause) -> WriteRecord:
-    changes = _changes(before[1], after[1])
+def _record(
+    paths: tuple[Path, ...], before: _Version, after: _Version, cause: WriteCause, layout: ConfigLayout
+) -> WriteRecord:
+    changes = _changes(before[1], after[1], layout)
     return WriteRecord(
         at=datetime.now(UTC),
         kind=cause.kind,
@@ -184,13 +188,26 @@ def _record(paths: tuple[Path, ...], before: _Version, after: _Version, cause: W
     )
 
 
-def _changes(before: Geometry | None, after: Geometry | None) -> list[NumberChange] | None:
+_LIKE_A_MM = {str(unit): unit.like_a_mm for unit in ParameterUnit} | {"um/N": 10.0}
+"""What counts as much as a millimetre; a compliance under a hundred newtons. A weight is no length."""
+
+
+def _changes(
+    before: ControllerGeometry | None, after: ControllerGeometry | None, layout: ConfigLayout
+) -> list[NumberChange] | None:
     if before is None or after is None:
         return None
-    units = [one.kind.unit for one in after.parameters.parameters]
-    found = zip(after.parameters.names, (after.vector - before.vector).tolist(), units, strict=True)
-    ranked = sorted((one for one in found if one[1]), key=lambda one: -abs(one[1]) / one[2].like_a_mm)
-    return [NumberChange(name=name, change=change, unit=unit.value) for name, change, unit in ranked]
+    old, new = numbers_of(before, layout), numbers_of(after, layout)
+    found = [
+        NumberChange(
+            name=name, change=new.get(name, (unit, 0.0))[1] - old.get(name, (unit, 0.0))[1], unit=unit
+        )
+        for name, (unit, _) in (old | new).items()
+    ]
+    return sorted(
+        (one for one in found if one.change),
+        key=lambda one: -abs(one.change) / _LIKE_A_MM.get(one.unit, np.inf),
+    )
 
 
 # A link would lead what is appended to another file; a pipe would be waited for.

@@ -5,12 +5,50 @@ that of legs as long as play and compliance make them under the weight: a leg th
 half its play, and by its compliance times its force.
 """
 
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from enum import StrEnum
+from typing import NamedTuple
+
+from hexacell.kinematics.parameters import JointUnit, ParameterUnit
 
 Six = tuple[float, float, float, float, float, float]
 Three = tuple[float, float, float]
 
 NONE: Six = (0.0,) * 6
+
+
+class CorrectionKind(StrEnum):
+    """What is corrected; the values are the names of the model's terms."""
+
+    BACKLASH = "backlash"
+    PLAY = "play"
+    COMPLIANCE = "compliance"
+
+    @property
+    def field(self) -> str:
+        """The name of its six coefficients in :class:`Corrections`, and in a config."""
+        names = {CorrectionKind.PLAY: "play_mm", CorrectionKind.COMPLIANCE: "compliance_um_n"}
+        return names.get(self, self.value)
+
+
+class CorrectionNumber(NamedTuple):
+    """One number of the corrections, as people call it."""
+
+    name: str
+    unit: str
+    value: float
+
+
+class CorrectionChange(NamedTuple):
+    """One number of the corrections that changes; 0 where it was not, or is no longer, stated."""
+
+    name: str
+    unit: str
+    before: float
+    after: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +80,45 @@ class Corrections:
     def are_none(self) -> bool:
         """Whether nothing is corrected."""
         return not any((*self.backlash, *self.play_mm, *self.compliance_um_n))
+
+    def of(self, kind: CorrectionKind) -> Six:
+        """The six coefficients of a kind."""
+        six: Six = getattr(self, kind.field)
+        return six
+
+    def taking(self, other: Corrections, kinds: Collection[CorrectionKind]) -> Corrections:
+        """These with some kinds of others, and with their weight if a force is needed for one of them."""
+        needs_forces = bool({CorrectionKind.PLAY, CorrectionKind.COMPLIANCE} & {*kinds})
+        weight = other if needs_forces else self
+        backlash, play_mm, compliance = (
+            (other if kind in kinds else self).of(kind) for kind in CorrectionKind
+        )
+        return Corrections(
+            backlash, play_mm, compliance, weight.weight_n, weight.weight_direction, weight.weight_centre_mm
+        )
+
+    def numbers(self, joint_unit: JointUnit) -> Iterator[CorrectionNumber]:
+        """All of them, each as "backlash of joint 3"; the weight's centre only where it is stated."""
+        mm, no_unit = str(ParameterUnit.MM), str(ParameterUnit.NONE)
+        units = {CorrectionKind.BACKLASH: str(joint_unit), CorrectionKind.PLAY: mm}
+        for kind in CorrectionKind:
+            part = "joint" if kind is CorrectionKind.BACKLASH else "leg"
+            for number, value in enumerate(self.of(kind), start=1):
+                yield CorrectionNumber(f"{kind} of {part} {number}", units.get(kind, "um/N"), value)
+        yield CorrectionNumber("weight", "N", self.weight_n)
+        for axis, value in zip("xyz", self.weight_direction, strict=True):
+            yield CorrectionNumber(f"weight's direction {axis}", no_unit, value)
+        for axis, value in zip("xyz", self.weight_centre_mm or (), strict=False):
+            yield CorrectionNumber(f"weight's centre {axis}", mm, value)
+
+    def changes_to(self, after: Corrections, joint_unit: JointUnit) -> tuple[CorrectionChange, ...]:
+        """The numbers that are others in ``after``."""
+        old, new = ({one.name: one for one in which.numbers(joint_unit)} for which in (self, after))
+        found: list[CorrectionChange] = []
+        for name, one in (old | new).items():
+            pair = (which[name].value if name in which else 0.0 for which in (old, new))
+            found.append(CorrectionChange(name, one.unit, *pair))
+        return tuple(one for one in found if one.before != one.after)
 
 
 NO_CORRECTIONS = Corrections()

@@ -245,7 +245,7 @@ def config_layout(settings: CellSettings) -> ConfigLayout:
     files = [(controller.config_format, controller.config_options)]
     files += [(one.config_format, one.config_options) for one in controller.further_files]
     formats = (_format_of(*file, parameters, is_part=is_part) for file in files)
-    return ConfigLayout(parameters, tuple(formats))
+    return ConfigLayout(parameters, tuple(formats), settings.mechanism.words.joint_unit)
 
 
 def _format_of(

@@ -12,9 +12,11 @@ from hexacell.config.write_record import WriteKind, WriteRecord
 from hexacell.text.layout import wrapped
 
 if TYPE_CHECKING:
+    from hexacell.kinematics.corrections import CorrectionChange
     from hexacell.services.write_back.config_history import ConfigHistory, ConfigWrite
     from hexacell.services.write_back.config_rollback import ConfigRollback
     from hexacell.services.write_back.proposals import AppliedProposal
+    from procedures.run.questions import PendingChange
 
 RELOAD = "Restart or reload the controller before it moves: until then it has the previous geometry."
 
@@ -32,12 +34,23 @@ def applied_text(applied: AppliedProposal) -> str:
     return "\n".join(
         (
             f"Written into {files_named(proposal.change.paths)}, approved by {applied.by}.",
+            *correction_lines(proposal.change.changed_corrections),
             *teaching,
             wrapped(RELOAD),
             f"`hexacell rollback` undoes it; the old config is {files_named(kept)}.",
             *filter(None, [wrapped(applied.unrecorded)]),
         )
     )
+
+
+def correction_lines(changes: Sequence[CorrectionChange]) -> tuple[str, ...]:
+    """What changes beside the geometry, a line each: "backlash of joint 3: 0 -> 0.102 mm"."""
+    return tuple(f"{one.name}: {one.before:.6g} -> {one.after:.6g} {one.unit}".rstrip() for one in changes)
+
+
+def pending_text(pending: PendingChange) -> str:
+    """A change that waits for a person: what changes beside the geometry, and the text change."""
+    return "\n".join([*correction_lines(pending.corrections), pending.diff.rstrip()])
 
 
 def rollback_text(done: ConfigRollback) -> str:
@@ -100,11 +113,12 @@ def files_named(paths: Sequence[Path], verb: str = "", verb_of_several: str = ""
 def versions_text(versions: ConfigVersions) -> str:
     """The three versions of an edited config, number by number, and the edit itself."""
     origin = "the run wrote it" if versions.is_from_written else "it was before the run"
-    table = [f"{'number':9}{'before':>16}{'written':>16}{'now':>16}"]
+    width = max([9, *(len(one.name) + 1 for one in versions.numbers)])
+    table = [f"{'number':{width}}{'before':>16}{'written':>16}{'now':>16}"]
     for one in versions.numbers:
         now = f"{'unreadable':>16}" if one.now is None else f"{one.now:16.6f}"
         edited = "  edited by hand" if one.is_edited else ""
-        table.append(f"{one.name:9}{one.before:16.6f}{one.written:16.6f}{now}{edited}")
+        table.append(f"{one.name:{width}}{one.before:16.6f}{one.written:16.6f}{now}{edited}")
     if not versions.numbers:
-        table = ["No number of the geometry differs."]
+        table = ["No number of the geometry or of the corrections differs."]
     return "\n".join([*table, f"The edit since {origin}:", versions.edit.rstrip("\n")])

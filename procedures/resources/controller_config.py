@@ -32,6 +32,7 @@ from hexacell.config.layout import Contents, fingerprint, fingerprint_of, read_c
 from hexacell.config.write_back import commit, rollback
 from hexacell.config.write_record import THE_RUN, WriteCause, WriteKind, recorded_write
 from hexacell.errors import FileError, HexacellError, Interruption, WriteBackUndone
+from hexacell.kinematics.corrections import Corrections
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot.model import config_layout
 from hexacell.runs.run_folder import RunFolder
@@ -135,12 +136,18 @@ class ConfigChanges:
         """Where the config is kept while the controller has a provisional geometry."""
         return self.folder.path / PROVISIONAL_FOLDER
 
-    def change_to(self, geometry: Geometry, state: RunState) -> ConfigChange:
-        """The change of the config to a geometry in the controller's frames; nothing is written."""
+    def change_to(
+        self, geometry: Geometry, state: RunState, corrections: Corrections | None = None
+    ) -> ConfigChange:
+        """The change of the config to a geometry in the controller's frames; nothing is written.
+
+        Without ``corrections`` it keeps those that it has.
+        """
         return propose(
             self.cell.config_paths,
             config_layout(self.cell.settings),
             geometry,
+            corrections,
             fingerprint_at_start=state.started.config_sha256 if state.started else "",
         )
 

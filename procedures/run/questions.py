@@ -6,6 +6,7 @@ from typing import Protocol
 
 from drivers.interfaces import StartupAction
 from hexacell.cell.recovery import Action
+from hexacell.kinematics.corrections import CorrectionChange
 from hexacell.kinematics.pose import Pose
 from hexacell.results.result import ExpectedImprovement
 from hexacell.results.written_geometry import TaskDisplacement
@@ -38,6 +39,7 @@ class GaugePlacement:
 class PendingChange:
     """A change of the controller's config: its acceptance gates, and the text change as a diff.
 
+    ``corrections`` are the numbers beside the geometry that it changes.
     ``displacement`` is how far it moves taught points, ``improvement`` what it is for; None if that is not
     known.
     """
@@ -46,6 +48,7 @@ class PendingChange:
     diff: str
     displacement: TaskDisplacement | None = None
     improvement: ExpectedImprovement | None = None
+    corrections: tuple[CorrectionChange, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,10 +118,11 @@ def ask_approval(
     improvement: ExpectedImprovement | None = None,
     *,
     cell: str,
+    corrections: tuple[CorrectionChange, ...] = (),
 ) -> Question:
     """Ask whether the config of a cell may be written; answered by the name of who approves."""
     is_grave = any(gate.needs_cell_name and not gate.passed for gate in gates)
-    change = PendingChange(tuple(gates), diff, displacement, improvement)
+    change = PendingChange(tuple(gates), diff, displacement, improvement, corrections)
     return Question(change, consent=cell if is_grave else "yes")
 
 

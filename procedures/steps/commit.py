@@ -56,7 +56,14 @@ class Commit(StepWithoutMotion):
         displacement = proposed.displacement if proposed else None
         improvement = state.identified.improvement if state.identified else None
         name = await run.operator.ask(
-            ask_approval(conditions, change.diff, displacement, improvement, cell=run.settings.name)
+            ask_approval(
+                conditions,
+                change.diff,
+                displacement,
+                improvement,
+                cell=run.settings.name,
+                corrections=change.changed_corrections,
+            )
         )
         if name is None:
             raise LimitError("the new geometry was declined; nothing was applied")

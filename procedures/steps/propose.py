@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import ClassVar, Literal
 
 from hexacell.cell.fields import GeometryDocument
+from hexacell.kinematics.corrections import Corrections
 from hexacell.results.written_geometry import TaskDisplacement, as_written
 from hexacell.verdict.acceptance_gates import AcceptanceGate, gates
 from procedures.resources.run_resources import RunResources
@@ -14,13 +15,15 @@ from procedures.steps.base import BaseEvent, Computation
 class Proposed(BaseEvent):
     """The new config was saved in the run folder, and the gates for writing it were evaluated.
 
-    ``written`` is the geometry in it; ``displacement`` is how far that moves the task poses.
+    ``written`` is the geometry in it, ``corrections`` what the controller adds to that; ``displacement`` is
+    how far the geometry moves the task poses.
     """
 
     kind: Literal["proposed"] = "proposed"
     gates: tuple[AcceptanceGate, ...]
     written: GeometryDocument
     displacement: TaskDisplacement | None = None
+    corrections: Corrections | None = None
 
     def applied_to(self, state: RunState) -> RunState:
         return replace(state, proposed=self)
@@ -52,5 +55,8 @@ class Propose(Computation):
         change = run.config.change_to(written.geometry, state)
         change.save(run.folder.proposal, like=run.cell.config_path)
         return Proposed(
-            gates=conditions, written=written.geometry.document(), displacement=written.displacement
+            gates=conditions,
+            written=written.geometry.document(),
+            displacement=written.displacement,
+            corrections=change.corrections_after,
         )

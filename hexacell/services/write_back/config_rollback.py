@@ -157,8 +157,7 @@ def _require_known(cell: Cell, receipts: list[Receipt], found: Contents) -> None
 def _edited_since(cell: Cell, latest: Receipt) -> ConfigEditedSince:
     layout = config_layout(cell.settings)
     before, written = (
-        (layout.read(*latest.kept(name)).geometry, read_contents(latest.kept(name)))
-        for name in (BEFORE, AFTER)
+        (layout.read(*latest.kept(name)), read_contents(latest.kept(name))) for name in (BEFORE, AFTER)
     )
     return ConfigEditedSince(
         f"the config was edited since {latest.backup_folder.name} wrote it; rolling back would lose that",

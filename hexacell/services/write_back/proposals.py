@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from hexacell.cell.loader import load_cell
 from hexacell.config.change import ConfigChange, ConfigEditedSince, JsonRecord, compare_versions
+from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import ConfigLayout, are_same_files, fingerprint
 from hexacell.config.pending_write import held_config
 from hexacell.config.write_back import commit
@@ -103,7 +104,12 @@ def approval_question(proposal: Proposal) -> Question:
     state = proposal.state
     improvement = state.identified.improvement if state.identified else None
     return ask_approval(
-        proposal.gates, proposal.change.diff, proposal.displacement, improvement, cell=proposal.cell
+        proposal.gates,
+        proposal.change.diff,
+        proposal.displacement,
+        improvement,
+        cell=proposal.cell,
+        corrections=proposal.change.changed_corrections,
     )
 
 
@@ -190,11 +196,15 @@ def _require_unedited(proposal: Proposal) -> None:
             subject=change.path,
             action="Resume that run, which takes it back",
         )
+    before, after = (
+        ControllerGeometry(Geometry.of(proposal.parameters, geometry), (), corrections=corrections)
+        for geometry, corrections in (
+            (change.before, change.corrections_before),
+            (change.after, change.corrections_after),
+        )
+    )
     versions = compare_versions(
-        change.paths,
-        proposal.layout,
-        (Geometry.of(proposal.parameters, change.before), change.before_contents),
-        (Geometry.of(proposal.parameters, change.after), change.after_contents),
+        change.paths, proposal.layout, (before, change.before_contents), (after, change.after_contents)
     )
     raise ConfigEditedSince(
         "the config changed since the run began; its geometry does not belong to it",
@@ -215,6 +225,7 @@ def _require_together(
         folder.proposal.is_symlink()
         or not (is_same_config and is_same_text)
         or proposed.written != change.after
+        or proposed.corrections not in {None, change.corrections_after}
     ):
         raise FileError(
             "this proposal is not the one of its journal", subject=folder.proposal, action=RESTORE

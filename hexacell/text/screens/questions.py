@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from hexacell.run_process.messages import LiveSnapshot
+from hexacell.text.config_changes import pending_text
 from hexacell.text.screens.views import Choice, QuestionView, Urgency
 from hexacell.text.verdict import gate_lines, improvement_sentence, teaching_sentence
 from hexacell.verdict.acceptance_gates import AcceptanceGate
@@ -24,10 +25,10 @@ def question_view(question: questions.Question, live: LiveSnapshot | None) -> Qu
     match question.subject:
         case questions.GaugePlacement() as place:
             return _placement(place, live)
-        case questions.PendingChange(gates=gates, diff=diff, displacement=moved, improvement=improvement):
+        case questions.PendingChange(gates=gates, displacement=moved, improvement=improvement) as pending:
             facts = (gate_lines(gates), improvement_sentence(improvement), teaching_sentence(moved))
             view = _consenting(question, "write it", "Write the new geometry into the controller's config?")
-            change, refusal = f"The change:\n{diff.rstrip()}", approval_refusal(gates)
+            change, refusal = f"The change:\n{pending_text(pending)}", approval_refusal(gates)
             return replace(view, paragraphs=tuple(filter(None, facts)), change=change, refusal=refusal)
         case questions.WrittenResult(line=line, displacement=moved):
             title, otherwise = "The result did not pass. Keep it all the same?", "restore the old config"

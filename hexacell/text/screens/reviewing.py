@@ -3,6 +3,7 @@
 import numpy as np
 
 from hexacell.cell.model import CellSettings
+from hexacell.text.config_changes import pending_text
 from hexacell.text.line_face import event_text
 from hexacell.text.parameters import parameter_table, rows_of_run
 from hexacell.text.screens.measuring import accuracy_plot
@@ -36,7 +37,7 @@ def review_texts(
     ``may_write`` is whether this is a recorded run whose proposal can be written.
     """
     state, subject = picture.state, picture.question and picture.question.subject
-    diff = subject.diff if isinstance(subject, PendingChange) else ""
+    change = pending_text(subject) if isinstance(subject, PendingChange) else ""
     verdict = "No verdict yet: it is given once the held-out poses are measured."
     if state.judged is not None:
         verdict = f"{state.judged.verdict.upper()}: {VERDICT_MEANINGS[state.judged.verdict]}"
@@ -48,7 +49,7 @@ def review_texts(
         "comparison": "\n".join(_comparison(state)),
         "parameters-header": header,
         "parameters": "\n".join(parameters) or "The geometry is not identified yet.",
-        "change": diff.rstrip("\n") or "There is no change yet.",
+        "change": change or "There is no change yet.",
     }
 
 

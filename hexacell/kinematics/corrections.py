@@ -27,12 +27,6 @@ class CorrectionKind(StrEnum):
     PLAY = "play"
     COMPLIANCE = "compliance"
 
-    @property
-    def field(self) -> str:
-        """The name of its six coefficients in :class:`Corrections`, and in a config."""
-        names = {CorrectionKind.PLAY: "play_mm", CorrectionKind.COMPLIANCE: "compliance_um_n"}
-        return names.get(self, self.value)
-
 
 class CorrectionNumber(NamedTuple):
     """One number of the corrections, as people call it."""
@@ -80,11 +74,6 @@ class Corrections:
     def are_none(self) -> bool:
         """Whether nothing is corrected."""
         return not any((*self.backlash, *self.play_mm, *self.compliance_um_n))
-
-    def of(self, kind: CorrectionKind) -> Six:
-        """The six coefficients of a kind."""
-        six: Six = getattr(self, kind.field)
-        return six
 
     def taking(self, other: Corrections, kinds: Collection[CorrectionKind]) -> Corrections:
         """These with some kinds of others, and with their weight if a force is needed for one of them."""

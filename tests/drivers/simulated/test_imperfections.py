@@ -73,13 +73,20 @@ class Machine:
     def physics(self) -> RobotPhysics:
         return RobotPhysics(self.mechanism, self.settings, StillClock(), self.commanding, self.home)
 
-    def fallen(self, row: int, poses: PoseBatch) -> float:
-        """How far the centre of the weight is below where it is without imperfections, mm."""
-        centre = (
+    def weight(self, row: int, load: SimulatedLoad) -> tuple[Array, Array]:
+        """The force, N, and the place in the platform at which it acts at a pose, mm."""
+        at_joints = (
             self.mechanism.legs(self.geometry, self.poses, self.joints).platform_joints[row].mean(axis=0)
         )
-        arm = self.poses.rotations[row].T @ (centre - self.poses.positions[row])
-        return float((centre - poses.positions[0] - poses.rotations[0] @ arm)[2])
+        middle = self.poses.rotations[row].T @ (at_joints - self.poses.positions[row])
+        force = load.weight_n * np.array(load.direction) / np.linalg.norm(load.direction)
+        return force, middle if load.centre_mm is None else np.array(load.centre_mm)
+
+    def work(self, row: int, poses: PoseBatch, load: SimulatedLoad) -> float:
+        """What the weight does on the way from a pose to another, N mm: above 0 if it sinks."""
+        force, centre = self.weight(row, load)
+        before = self.poses.positions[row] + self.poses.rotations[row] @ centre
+        return float(force @ (poses.positions[0] + poses.rotations[0] @ centre - before))
 
 
 @pytest.fixture(params=CELLS)
@@ -101,10 +108,13 @@ def test_without_imperfections_the_pose_is_that_of_the_geometry(name: str) -> No
         assert np.array_equal(backlash.follow(machine.joints[row]), machine.joints[row])
 
 
-def test_legs_are_in_balance_with_the_weight(name: str) -> None:
-    """Forces and moments about the base's origin, and virtual work: a longer leg lifts the weight."""
+ASLANT = SimulatedLoad(weight_n=80.0, centre_mm=(60.0, -40.0, 20.0), direction=(0.5, 0.2, -3.0))
+
+
+@pytest.mark.parametrize("load", [SimulatedLoad(weight_n=80.0), ASLANT])
+def test_legs_are_in_balance_with_the_weight(name: str, load: SimulatedLoad) -> None:
+    """Forces, moments about the base's origin, and virtual work: lengths times forces are its work."""
     machine = Machine(name)
-    load = SimulatedLoad(weight_n=80.0)
     mechanism, geometry, poses, joints = machine.mechanism, machine.geometry, machine.poses, machine.joints
     tensions = leg_tensions(mechanism, geometry, poses, joints, load)
     legs = mechanism.legs(geometry, poses, joints)
@@ -112,15 +122,16 @@ def test_legs_are_in_balance_with_the_weight(name: str) -> None:
         ends = legs.platform_joints[row]
         along = legs.base_joints[row] - ends
         pulls = tensions[row][:, None] * along / np.linalg.norm(along, axis=1)[:, None]
-        assert pulls.sum(axis=0) == pytest.approx([0.0, 0.0, 80.0], abs=1e-8)
-        of_weight = np.cross(ends.mean(axis=0), [0.0, 0.0, -80.0])
+        force, centre = machine.weight(row, load)
+        assert pulls.sum(axis=0) == pytest.approx(-force, abs=1e-8)
+        of_weight = np.cross(poses.positions[row] + poses.rotations[row] @ centre, force)
         assert np.cross(ends, pulls).sum(axis=0) == pytest.approx(-of_weight, abs=1e-5)
         for leg in range(6):
             changes = with_longer_legs(
                 mechanism, geometry, joints[[row]], poses[[row]], 1e-3 * np.eye(6)[leg]
             )
             longer = forward_kinematics(mechanism, *changes, poses[[row]]).poses
-            assert tensions[row, leg] * 1e-3 == pytest.approx(80.0 * machine.fallen(row, longer), abs=1e-4)
+            assert tensions[row, leg] * 1e-3 == pytest.approx(machine.work(row, longer, load), abs=1e-4)
 
 
 def test_legs_yield_by_their_forces_and_the_weight_sinks(name: str) -> None:
@@ -133,7 +144,7 @@ def test_legs_yield_by_their_forces_and_the_weight_sinks(name: str) -> None:
         assert longer_by(machine, row, poses) == pytest.approx(
             1e-3 * np.array(COMPLIANCE) * tensions, abs=1e-8
         )
-        work = 100.0 * machine.fallen(row, poses)
+        work = machine.work(row, poses, machine.settings.load)
         assert work > 0.0
         assert work == pytest.approx(float(1e-3 * np.array(COMPLIANCE) @ tensions**2), rel=0.01)
 
@@ -149,7 +160,7 @@ def test_legs_with_play_lie_at_the_end_to_which_the_weight_brings_them(name: str
         seated = np.interp(tensions, [-SEATED_N, SEATED_N], [-1.0, 1.0])
         longer = longer_by(machine, row, poses)
         assert longer == pytest.approx(0.5 * np.array(PLAY) * seated, abs=1e-7)
-        assert tensions @ longer > 0.0
+        assert machine.work(row, poses, load) > 0.0
 
 
 def longer_by(machine: Machine, row: int, poses: PoseBatch) -> Array:
@@ -269,6 +280,29 @@ def test_a_joint_that_comes_from_either_side_is_apart_by_its_backlash(name: str)
     joints[3] -= 0.01
     expected = forward_kinematics(machine.mechanism, machine.geometry, joints[None], start).poses
     assert ball(-0.01) == pytest.approx(expected.positions[0], abs=1e-8)
+
+
+def test_all_of_them_together_add_up_in_the_lengths_of_the_legs() -> None:
+    """Of a Gough-Stewart platform after a move: expansion, backlash, play and compliance."""
+    changes = {"joints.backlash_mm": 0.06, "legs.play_mm": PLAY, "legs.compliance_um_n": COMPLIANCE}
+    others = {"load.weight_n": 200.0, "temperature.rise_k": 5.0, "temperature.over_s": 10.0}
+    machine = Machine("gough-stewart", **STILL | changes | others)
+    physics, load = machine.physics(), machine.settings.load
+    clock: Any = physics._clock
+    physics.start_motion(
+        np.stack([physics.encoder_positions(), machine.joints[1] + 9.0, machine.joints[1]])
+    )
+    clock.time_s += 100.0
+    physics.gauge_displacement("x")
+    grown = 1.0 + 5.0 * 11.5e-6
+    warm, pose = Geometry(machine.mechanism.parameters, machine.geometry.vector * grown), physics._pose
+    joints = (machine.joints[[1]] + 0.03) * grown
+    tensions = leg_tensions(machine.mechanism, warm, pose, joints, load)[0]
+    assert np.abs(tensions).min() > SEATED_N
+    longer = 0.5 * np.array(PLAY) * np.sign(tensions) + 1e-3 * np.array(COMPLIANCE) * tensions
+    ends = pose.positions[0] + warm["platform"] @ pose.rotations[0].T
+    lengths = np.linalg.norm(ends - warm["base"], axis=1)
+    assert lengths == pytest.approx(warm["offset"] + joints[0] + longer, abs=1e-7)
 
 
 def test_six_sliders_with_the_same_backlash_move_the_platform_by_it(make_twin) -> None:

@@ -79,6 +79,7 @@ class SolverOptions:
         iterations: the largest number of iterations in one search.
         searches: the largest number of searches around singularities.
         closed_mm: largest constraint of a pose.
+        relief: factor of the damping after a step that gains as much as predicted.
     """
 
     damping: float
@@ -86,13 +87,15 @@ class SolverOptions:
     iterations: int = ITERATIONS
     searches: int = SEARCHES
     closed_mm: float = TOLERANCE_MM
+    relief: float = 0.1
 
 
 COARSE = SolverOptions(INITIAL_DAMPING, 1e-3)
 """From the drawing, millimetres away, to near the solution."""
 
-QUICK = SolverOptions(INITIAL_DAMPING, 1e-3, iterations=60, searches=12, closed_mm=1e-8)
-"""Twice the iterations that consistent records need; what follows it closes the poses."""
+QUICK = SolverOptions(0.1, 1e-3, iterations=60, searches=12, closed_mm=1e-8, relief=0.01)
+"""Twice the iterations that consistent records need. From the drawing the first steps are no Gauss-Newton
+steps, which may lead where legs do not close; poses are closed once more by what follows."""
 
 INCREMENTAL = SolverOptions(SMALL_DAMPING, 1e-3)
 """From the solution without the last record."""
@@ -271,11 +274,12 @@ def _advance(now: _Iterate, options: SolverOptions) -> _Iterate | Termination:
     cost = now.cost(now.prediction.residuals, now.from_centre())
     actual = cost - now.cost(trial.poses.positions - now.problem.deviations, now.from_centre(step))
     if actual > 0.0:
-        return _accepted(now, step, trial.poses, actual / predicted if predicted > 0.0 else 0.0)
+        ratio = actual / predicted if predicted > 0.0 else 0.0
+        return _accepted(now, step, trial.poses, ratio, options.relief)
     if predicted > NEGLIGIBLE_GAIN * max(cost, 1e-12):
         return now.damped()
     # The numbers cannot resolve by how much the cost falls, but the gradient is exact to many more digits.
-    return replace(_accepted(now, step, trial.poses, 1.0), is_last=True)
+    return replace(_accepted(now, step, trial.poses, 1.0, options.relief), is_last=True)
 
 
 def _damped_step(now: _Iterate) -> tuple[Array, float]:
@@ -287,9 +291,9 @@ def _damped_step(now: _Iterate) -> tuple[Array, float]:
     return step, float(step @ (scaling * step) - step @ gradient)
 
 
-def _accepted(now: _Iterate, step: Array, poses: PoseBatch, ratio: float) -> _Iterate:
+def _accepted(now: _Iterate, step: Array, poses: PoseBatch, ratio: float, relief: float) -> _Iterate:
     """The iterate after a step, by the ratio of its actual to its predicted gain."""
-    damping = max(now.damping * max(0.1, 1.0 - (2.0 * ratio - 1.0) ** 3), SMALLEST_DAMPING)
+    damping = max(now.damping * max(relief, 1.0 - (2.0 * ratio - 1.0) ** 3), SMALLEST_DAMPING)
     before = now.prediction
     prediction = predict(now.problem, before.free + step, poses, before.mode)
     return _Iterate.at(now.problem, now.precision, prediction, damping)

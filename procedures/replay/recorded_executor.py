@@ -129,7 +129,7 @@ class RecordedStepExecutor(StepExecutor):
             raise DeviceError("the journal has no series", subject="the recorded devices")
         return ReadingSeries(**{name: getattr(outcome, name) for name in ReadingSeries.model_fields})
 
-    async def read(self, windows: int = 1) -> Reading:
+    async def read(self, state: RunState, windows: int = 1) -> Reading:
         """The recorded reading; raises ``GaugeAtEnd`` where the recorded gauges did."""
         outcome = self.recorded.outcome
         if isinstance(outcome, events.RecordRejected) and outcome.reading is None:
@@ -138,4 +138,4 @@ class RecordedStepExecutor(StepExecutor):
         too_wide = max(reading.spread_mm) > timing.spread_gauge_mm + TOLERANCE
         if too_wide or len(reading.counts) < windows * timing.readings:
             raise DeviceError("the recorded readings had not settled", subject="the recorded devices")
-        return reading
+        return reading.model_copy(update={"directions": state.directions})

@@ -15,8 +15,9 @@ from hexacell.clock import CellClock
 from hexacell.config.layout import CurrentConfig
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.measurements.records import deviation_of, joints_of
-from hexacell.motion.trajectory import LineDurations
+from hexacell.measurements.records import Directions, deviation_of, joints_of
+from hexacell.motion.arrival import arrival_directions, least_way
+from hexacell.motion.trajectory import LineDurations, interpolate_line
 from hexacell.noise.allowances import ReferenceChange
 from hexacell.robot.model import config_layout
 from hexacell.runs.run_folder import RunFolder
@@ -32,6 +33,9 @@ from procedures.run.questions import Operator, Question
 from procedures.run.readings import Reading, ReadingSeries, Temperature
 from procedures.run.state import RunState
 from procedures.run.trips import Guard, Trip, WatchedSet
+
+ARRIVAL_PIECES = 240
+"""Pieces of a line along which joints are followed: of 100 mm, a reversal within one is of 2 um."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,20 +148,29 @@ class RunResources:
 
         await self.guards.move(target, duration_s, watched, commanded)
 
+    def arrival_directions(self, state: RunState, start: Pose, target: Pose) -> Directions:
+        """From which side each joint arrives at the end of a move, by the controller's straight line."""
+        commanding, mechanism = self.current_config.geometry(), self.settings.mechanism
+        line = interpolate_line(PoseBatch.of([start]), PoseBatch.of([target]), ARRIVAL_PIECES)
+        joints = mechanism.inverse(commanding.geometry, commanding.branch, line)
+        stops = self.calibration.known(state).allowances.stops
+        least = least_way(mechanism.words.joint_unit, stops)
+        return arrival_directions(joints, state.directions, least)
+
     async def ask_at_standstill(self, question: Question) -> str | None:
         """Ask a person while the robot must not move."""
         return await self.guards.at_standstill(lambda: self.operator.ask(question))
 
     # What the instruments read.
 
-    async def read(self, windows: int = 1) -> Reading:
+    async def read(self, state: RunState, windows: int = 1) -> Reading:
         """The mean of some settled windows of all devices; raises ``HexacellError``."""
         timing = self.settings.timing
         settled = [
             await self.guards.during_readings(lambda: settle(self.devices, timing, self.clock))
             for _ in range(windows)
         ]
-        return _reading(self.devices, settled, await self.thermometers.read())
+        return _reading(self.devices, settled, await self.thermometers.read(), state.directions)
 
     async def read_series(self, count: int) -> ReadingSeries:
         """A series of readings of all devices, once they are settled; raises ``HexacellError``."""
@@ -182,7 +195,10 @@ class RunResources:
 
 
 def _reading(
-    devices: Devices, settled: Sequence[Settled], temperatures: tuple[Temperature, ...]
+    devices: Devices,
+    settled: Sequence[Settled],
+    temperatures: tuple[Temperature, ...],
+    directions: Directions,
 ) -> Reading:
     """The trimmed mean of settled windows, with the largest range within one of them."""
     gauges = trimmed_mean(np.concatenate([one.gauges for one in settled]))
@@ -193,6 +209,7 @@ def _reading(
         spread_mm=deviation_of(np.abs(_on_axes(devices, spreads))),
         joints=joints_of(joints),
         temperatures=temperatures,
+        directions=directions,
         **_raw([snapshot for one in settled for snapshot in one.window]),
     )
 

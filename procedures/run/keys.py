@@ -1,12 +1,27 @@
 """Where something is measured, and what for: phases, and the keys of sets."""
 
 from enum import StrEnum
+from typing import Annotated
+
+from pydantic import AfterValidator
 
 from hexacell.campaign.pilots import pilot_number
 from hexacell.cell.fields import Frozen
+from hexacell.kinematics.parameters import LEGS
+from hexacell.measurements.records import Directions
 
 SixNumbers = tuple[float, float, float, float, float, float]
 ThreeNumbers = tuple[float, float, float]
+
+
+def _of_joints(directions: Directions) -> Directions:
+    if directions and (len(directions) != LEGS or not {-1, 0, 1}.issuperset(directions)):
+        raise ValueError("must be six of 1, -1 and 0, or none")
+    return directions
+
+
+ArrivalDirections = Annotated[Directions, AfterValidator(_of_joints)]
+"""Whether each joint last moved up, 1, or down, -1; 0 where that is not known; empty: nothing is known."""
 
 
 class Phase(StrEnum):

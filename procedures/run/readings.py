@@ -8,7 +8,7 @@ from hexacell.cell.devices import ThermometerSettings
 from hexacell.cell.fields import Frozen
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
-from procedures.run.keys import SixNumbers, ThreeNumbers
+from procedures.run.keys import ArrivalDirections, SixNumbers, ThreeNumbers
 
 
 class Temperature(Frozen):
@@ -36,13 +36,15 @@ class Reading(RawReadings):
     """A settled window of readings.
 
     ``gauges_mm`` and ``spread_mm`` are mean and range along base x, y, z; ``joints`` are the mean joint
-    variables, mm or deg. ``temperatures`` are those of the cell's thermometers just afterwards.
+    variables, mm or deg, and ``directions`` those in which each had arrived. ``temperatures`` are those of
+    the cell's thermometers just afterwards.
     """
 
     gauges_mm: ThreeNumbers
     spread_mm: ThreeNumbers
     joints: SixNumbers
     temperatures: tuple[Temperature, ...] = ()
+    directions: ArrivalDirections = ()
 
 
 class ReadingSeries(RawReadings):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from hexacell.cell.recovery import FailureKind
 from hexacell.kinematics.commanded_motion import RefusedCommand, RefusedCommands
-from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.measurements.records import Directions, MeasurementSet, Record
 from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
 from procedures.run.readings import Reading
 
@@ -112,6 +112,7 @@ class RunState:
         noise: what was measured of it; None before that, or where the cell file does not ask for it.
         at_pose: the set and orientation of the pose that the robot is at; None if it is at none.
         target: the pose that it was last commanded to or located at.
+        directions: from which side each joint arrived there; empty where nothing is known of that.
         off_plan: it is at a pose of no set: it was located there, or is at a waypoint.
         path_from_reference: orientations and poses by which it came from the reference it was at last;
             0 where nothing is measured.
@@ -132,6 +133,7 @@ class RunState:
     sets: dict[SetKey, SetState] = field(default_factory=dict)
     at_pose: tuple[SetKey, int] | None = None
     target: SixNumbers | None = None
+    directions: Directions = ()
     off_plan: bool = False
     path_from_reference: tuple[tuple[int, SixNumbers], ...] = ()
     position_unknown: bool = False
@@ -166,7 +168,7 @@ class RunState:
 
     def without_position(self) -> RunState:
         """The state in which nobody knows where the robot is."""
-        return replace(self, at_pose=None, position_unknown=True)
+        return replace(self, at_pose=None, position_unknown=True, directions=())
 
     def unverified(self, but: SetKey | None = None) -> RunState:
         """The state in which the gauges of all open sets but one may have been moved or switched off."""

@@ -63,7 +63,7 @@ class CloseSet(StepOfSet):
 
     async def perform(self, run: RunResources, state: RunState) -> SetClosed:
         """Read again; raises ``DriftTripped`` if gauges show what neither encoders nor noise explain."""
-        reading = await run.read()
+        reading = await run.read(state)
         change = run.since_reference(state, self.at, reading)
         await run.check_gauges()
         if trip := reference_drift(str(self.at), change, run.settings.acceptance.drift_mm):

@@ -22,8 +22,9 @@ class Located(BaseEvent):
     encoders: SixNumbers
 
     def applied_to(self, state: RunState) -> RunState:
-        """The robot is at a pose of no set."""
-        return replace(state, at_pose=None, off_plan=True, target=self.pose, position_unknown=False)
+        """The robot is at a pose of no set, and from which side its joints arrived is not known."""
+        located = replace(state.without_position(), off_plan=True, target=self.pose)
+        return replace(located, position_unknown=False)
 
 
 class Locate(BaseStep):

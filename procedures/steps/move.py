@@ -15,7 +15,7 @@ from hexacell.kinematics.pose import Pose
 from hexacell.lengths import from_to
 from procedures.resources.run_resources import RunResources
 from procedures.run.cancellation import in_thread
-from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
+from procedures.run.keys import ArrivalDirections, Phase, SetKey, SixNumbers, ThreeNumbers
 from procedures.run.state import RunState
 from procedures.run.trips import Guard, GuardTripped, WatchedSet
 from procedures.steps.base import BaseEvent, EventAtPose, StepAtPose
@@ -30,9 +30,10 @@ STUCK_GAUGE_SIGMAS = 5.0
 
 
 class Arrived(EventAtPose):
-    """A move has ended at its pose."""
+    """A move has ended at its pose; ``directions`` say from which side each joint arrived."""
 
     kind: Literal["arrived"] = "arrived"
+    directions: ArrivalDirections = ()
 
     def applied_to(self, state: RunState) -> RunState:
         """The gauges of all other open sets may be carried away now."""
@@ -44,6 +45,7 @@ class Arrived(EventAtPose):
             at_pose=None if is_waypoint else (self.at, self.orientation),
             off_plan=is_waypoint,
             target=self.pose,
+            directions=self.directions,
             path_from_reference=self._path(state),
             position_unknown=False,
             is_in_estop=False,
@@ -155,7 +157,8 @@ class Move(StepAtPose):
             run.guards.supervisor.clear()
             reason = str(tripped)
             return RecordRejected(at=self.at, orientation=self.orientation, reason=reason, on_the_way=True)
-        return Arrived(at=self.at, orientation=self.orientation, pose=self.pose)
+        directions = run.arrival_directions(state, here, self.target)
+        return Arrived(at=self.at, orientation=self.orientation, pose=self.pose, directions=directions)
 
     def _watched(self, state: RunState) -> WatchedSet:
         """What the gauges of the set must show on the way."""

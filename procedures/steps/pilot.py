@@ -5,13 +5,12 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import Record, deviation_of
 from procedures.resources.run_resources import RunResources
 from procedures.run.readings import Reading
 from procedures.run.state import RunState
 from procedures.steps.base import EventAtPose, StepAtPose
-from procedures.steps.sample import RecordRejected, read_inside
+from procedures.steps.sample import RecordRejected, read_inside, record_of
 
 
 class PilotTaken(EventAtPose):
@@ -23,7 +22,7 @@ class PilotTaken(EventAtPose):
     def record(self, zero: Reading) -> Record:
         """The record for the choice of poses; ``zero`` is the reading at the set's reference."""
         deviation = deviation_of(np.subtract(self.reading.gauges_mm, zero.gauges_mm))
-        return Record(self.at.point, self.orientation, Pose(*self.pose), self.reading.joints, deviation)
+        return record_of(self, self.reading, deviation)
 
     def applied_to(self, state: RunState) -> RunState:
         measured = state.set(self.at)

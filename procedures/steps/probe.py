@@ -32,4 +32,4 @@ class Probe(StepOfSet):
     purpose: ClassVar[str] = "trying the gauges"
 
     async def perform(self, run: RunResources, state: RunState) -> GaugesProbed:
-        return GaugesProbed(at=self.at, moved_mm=self.moved_mm, reading=await run.read())
+        return GaugesProbed(at=self.at, moved_mm=self.moved_mm, reading=await run.read(state))

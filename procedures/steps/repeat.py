@@ -30,4 +30,4 @@ class Repeat(StepOfSet):
     purpose: ClassVar[str] = "measuring the noise"
 
     async def perform(self, run: RunResources, state: RunState) -> ReferenceRepeated:
-        return ReferenceRepeated(at=self.at, reading=await run.read())
+        return ReferenceRepeated(at=self.at, reading=await run.read(state))

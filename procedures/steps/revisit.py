@@ -60,7 +60,7 @@ class Revisit(StepOfSet):
     async def perform(self, run: RunResources, state: RunState) -> ReferenceConfirmed | SetInvalidated:
         """Read again and compare; a plunger at its end voids the set."""
         try:
-            reading = await run.read()
+            reading = await run.read(state)
         except HexacellError as error:
             if not consists_only_of(error, GaugeAtEnd):
                 raise

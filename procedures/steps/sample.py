@@ -10,7 +10,7 @@ from hexacell.cell.model import CellSettings
 from hexacell.errors import HexacellError, consists_only_of, joined
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
-from hexacell.measurements.records import Record, deviation_of
+from hexacell.measurements.records import Deviation, Record, deviation_of
 from hexacell.robot.stated import gauge_travel_of
 from procedures.resources.run_resources import RunResources
 from procedures.run.keys import ThreeNumbers
@@ -30,9 +30,7 @@ class RecordTaken(EventAtPose):
     @property
     def record(self) -> Record:
         """The record for the identification."""
-        return Record(
-            self.at.point, self.orientation, Pose(*self.pose), self.reading.joints, self.deviation_mm
-        )
+        return record_of(self, self.reading, self.deviation_mm)
 
     def applied_to(self, state: RunState) -> RunState:
         measured = state.set(self.at)
@@ -92,12 +90,19 @@ class Sample(StepAtPose):
         )
 
 
+def record_of(event: EventAtPose, reading: Reading, deviation_mm: Deviation) -> Record:
+    """The record of what was read at a pose."""
+    pose, joints = Pose(*event.pose), reading.joints
+    point, orientation = event.at.point, event.orientation
+    return Record(point, orientation, pose, joints, deviation_mm, reading.directions)
+
+
 async def read_inside(
     step: StepAtPose, run: RunResources, state: RunState, windows: int = 1
 ) -> Reading | RecordRejected:
     """Read with the ball inside the gauges' travel, or reject the record."""
     try:
-        reading = await run.read(windows)
+        reading = await run.read(state, windows)
     except HexacellError as error:
         if not consists_only_of(error, GaugeAtEnd):
             raise

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
 
 from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.cell.devices import ThermometerSettings
@@ -48,6 +48,31 @@ def test_a_rejected_record_is_counted_and_voids_the_position(story) -> None:
     assert not state.left_travel, "it was not the new geometry that took the ball there"
     assert state.at_pose is None
     assert state.target == story().arrived(2).pose
+
+
+@pytest.mark.parametrize(
+    "event",
+    [
+        events.Interrupted(reason="killed", exit_code=130),
+        events.Paused(at_once=True),
+        located((0.0,) * 6),
+        events.ProvisionalReverted(),
+    ],
+    ids=lambda event: event.kind,
+)
+def test_directions_are_those_of_the_last_move_until_the_robot_was_lost(story, event) -> None:
+    directions = (1, -1, 0, 1, 1, -1)
+    arrived = story().arrived(2).model_copy(update={"directions": directions})
+    state = fold([story().arrived(), arrived])
+    assert apply(state, events.Paused(at_once=False)).directions == directions
+    assert apply(state, event).directions == ()
+
+
+@pytest.mark.parametrize("directions", [(1,) * 5, (1,) * 7, (2, 0, 0, 0, 0, 0)])
+def test_directions_are_six_or_none(story, directions) -> None:
+    arrived = story().arrived().model_dump()
+    with pytest.raises(ValidationError, match="six of 1, -1 and 0"):
+        events.Arrived(**{**arrived, "directions": directions})
 
 
 def test_an_invalidated_set_is_removed_and_counted(story) -> None:
@@ -227,6 +252,9 @@ def test_keys_are_stable(step: Any, key: str) -> None:
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
 st.register_type_strategy(float, NUMBERS)  # for what is drawn by its annotation
+SIX = st.just(()) | st.tuples(*[st.sampled_from([1, -1, 0])] * 6)
+READINGS = st.builds(Reading, **(dict.fromkeys(Reading.model_fields, ...) | {"directions": SIX}))
+st.register_type_strategy(Reading, READINGS)
 GEOMETRY = st.fixed_dictionaries({"S": st.tuples(*[st.tuples(*[NUMBERS] * 3)] * 6)})
 RESULT = st.builds(an_identification, converged=st.booleans(), chi2=NUMBERS, frame=st.text())
 GIVEN: dict[type[Any], dict[str, Any]] = {
@@ -235,6 +263,7 @@ GIVEN: dict[type[Any], dict[str, Any]] = {
     events.Identified: {"result": RESULT, "improvement": st.none(), "quick": st.none()},
     events.ResultValidated: {"check": st.none(), "length": st.none()},
     events.Proposed: {"written": GEOMETRY},
+    events.Arrived: {"directions": SIX},
 }
 """What their annotations do not say, as that a geometry has lists of equal length; and what is large."""
 

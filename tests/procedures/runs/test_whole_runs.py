@@ -10,6 +10,7 @@ from hexacell.config.change import ConfigChange, Receipt
 from hexacell.config.toml_format import NativeToml
 from hexacell.errors import ExitCode
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
+from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.measurements.csv_file import read_measurements
 from procedures.calibration.calibration import Mode
 from procedures.run.keys import Phase
@@ -105,6 +106,31 @@ async def test_a_check_whose_budget_is_used_says_how_many_records_would_decide(m
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
     assert re.search(r": not evaluated \(about \d+ more records would decide\)$", ended.line)
     assert len(happened(rig, events.RecordTaken)) == 4
+
+
+def test_records_know_from_which_side_joints_arrived(recording) -> None:
+    """That is how they moved at the end of the controller's straight line."""
+    mechanism, checked = Hexaglide(), 0
+    geometry = hexaglide_geometry(**recording.history[0].controller)
+    branch, here, arrived = recording.history[0].branch, None, None
+    for event in recording.history:
+        if isinstance(event, events.Committed):
+            break
+        if isinstance(event, events.Located):
+            here, arrived = event.pose, None
+        if isinstance(event, events.Arrived):
+            numbers = np.array([here, event.pose])
+            near_end = [Pose(*(0.005 * numbers[0] + 0.995 * numbers[1])), Pose(*numbers[1])]
+            last = np.diff(mechanism.inverse(geometry, branch, PoseBatch.of(near_end)), axis=0)[0]
+            known = np.array(event.directions) != 0
+            moved = known & (np.abs(last) > 1e-3)
+            np.testing.assert_array_equal(np.array(event.directions)[moved], np.sign(last)[moved])
+            checked += int(moved.sum())
+            here, arrived = event.pose, event
+        if isinstance(event, events.RecordTaken):
+            assert arrived is not None
+            assert event.record.directions == event.reading.directions == arrived.directions
+    assert checked > 100
 
 
 def test_samples_are_taken_only_where_the_robot_stands(recording) -> None:

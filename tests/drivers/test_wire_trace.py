@@ -20,11 +20,6 @@ def entry(data, time_s=1.5):
     return TraceEntry(time_s, "/dev/ttyUSB0", TrafficDirection.SENT, data)
 
 
-def test_an_entry_reads_as_one_line():
-    received = TraceEntry(12.3456789, "/dev/ttyUSB0", TrafficDirection.RECEIVED, b"+1.2\r")
-    assert str(received) == "12.345679 /dev/ttyUSB0 < 2b 31 2e 32 0d  +1.2."
-
-
 def test_the_latest_bytes_are_kept_and_the_rest_is_counted():
     trace = WireTrace(capacity=2 * (ENTRY_BYTES + 4))
     for number in range(5):

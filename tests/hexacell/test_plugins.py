@@ -40,21 +40,10 @@ def test_every_plugin_of_hexacell_can_be_loaded(group: Group) -> None:
     assert all(callable(plugins.load(group, name)) for name in plugins.names(group))
 
 
-def test_a_plugin_is_loaded(install: Install) -> None:
-    install("laser_b", "laser = laser_b:Laser", "class Laser: beam = 'red'")
-    assert vars(plugins.load(Group.GAUGES, "laser"))["beam"] == "red"
-
-
 def test_an_unknown_name_is_refused_with_the_nearest() -> None:
     with pytest.raises(UsageError, match=r"no gauge protocol 'sylvak'. Did you mean 'sylvac'\?") as caught:
         plugins.load(Group.GAUGES, "sylvak")
     assert caught.value.exit_code is ExitCode.USAGE
-
-
-def test_a_name_without_a_near_match_is_refused_with_all_names() -> None:
-    known = rf"no gauge protocol '12'\. Known are: {', '.join(plugins.names(Group.GAUGES))}"
-    with pytest.raises(UsageError, match=known):
-        plugins.load(Group.GAUGES, "12")
 
 
 @pytest.mark.parametrize(

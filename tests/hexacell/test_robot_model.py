@@ -13,7 +13,6 @@ from hexacell.cell.loader import load_cell
 from hexacell.config.interface import ControllerGeometry
 from hexacell.config.toml_format import NativeToml
 from hexacell.errors import FileError
-from hexacell.identification.problem.prior import Tolerances
 from hexacell.kinematics.mechanism import FrameTransform, inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
@@ -46,14 +45,6 @@ def on_floor(cell, paper):
     return make_robot(
         cell.settings, ControllerGeometry(Hexaglide().change_frames(paper.nominal, TO_FLOOR), paper.branch)
     )
-
-
-def test_the_bundled_cell_is_the_papers_simulated_robot(robot, paper):
-    for geometry in (robot.drawing, robot.controller, robot.prior.centre):
-        np.testing.assert_array_equal(geometry.vector, paper.nominal.vector)
-    assert robot.branch == paper.branch
-    assert robot.tolerances == Tolerances({"S": 7.0, "B": 7.0, "l": 7.0})
-    assert (robot.noise.encoder, robot.noise.gauge_mm) == (0.01, 0.01)
 
 
 @pytest.fixture

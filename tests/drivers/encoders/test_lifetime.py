@@ -12,14 +12,6 @@ from tests.drivers.encoders.conftest import short_timeout
 from tests.waiting import until
 
 
-async def test_no_thread_outlives_close(raw, bank):
-    before = set(threading.enumerate())
-    await bank.open()
-    assert len(set(threading.enumerate()) - before) == 2
-    await bank.close()
-    assert set(threading.enumerate()) == before
-
-
 async def test_no_thread_outlives_a_failed_open(raw, short_timeout_bank):
     before = set(threading.enumerate())
     del raw.nodes[1]

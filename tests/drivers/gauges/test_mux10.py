@@ -233,14 +233,6 @@ async def test_a_gauge_that_may_be_zeroed_at_either_end_shows_twice_its_travel(
         assert (await gauge.read()).value_mm == 9.0
 
 
-async def test_the_cell_file_says_which_readings_agree(dialogue, links, settings):
-    gauge = Mux10Gauge(settings("mux10", channel=2, agreement_mm=0.002), links)
-    values = [b"02A+0000.123\r", b"02A+0000.126\r", b"02A+0000.128\r"]
-    dialogue.expect(*OPENING, *((b"2\r", value) for value in values))
-    await gauge.open()
-    assert (await gauge.read()).value_mm == 0.128
-
-
 @pytest.mark.parametrize("damaged", [0, 1, 2])
 async def test_damage_below_the_agreement_is_outvoted_by_a_third_reading(
     dialogue, links, settings, damaged

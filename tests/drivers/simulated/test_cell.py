@@ -1,8 +1,6 @@
 """A whole simulated cell: every device answers on the wire, through the real drivers."""
 
 import asyncio
-import socket
-import threading
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
@@ -94,17 +92,3 @@ async def test_reloading_reads_the_config_and_moves_nothing(bundled_cell) -> Non
             await controller.reload(ALL)
             assert cell.machine.joints() == pytest.approx(sliders, abs=1e-6)
             assert (await pose_of(controller)).position != pytest.approx(believed.position, abs=0.5)
-
-
-def test_closing_ends_all_threads_and_may_be_repeated(bundled_cell) -> None:
-    before = set(threading.enumerate())
-    cell = serve(bundled_cell)
-    assert set(threading.enumerate()) > before
-    cell.close()
-    cell.close()
-    assert set(threading.enumerate()) == before
-    with (
-        pytest.raises(ConnectionRefusedError),
-        socket.create_connection(("127.0.0.1", cell.controller.port), 0.2),
-    ):
-        pass

@@ -108,10 +108,3 @@ def test_a_fault_waits_for_its_move(log) -> None:
         schedule.schedule(fault("y", at_move=schedule.move_count + 1))
         schedule.on_motion_start()
         assert log.wait_for(2) == [("inject", "x"), ("inject", "y")]
-
-
-def test_a_cell_file_with_an_impossible_fault_is_refused(bundled_cell) -> None:
-    settings = bundled_cell.settings
-    simulation = settings.simulation.model_copy(update={"faults": (fault("w"),)})
-    with pytest.raises(UsageError, match="simulated of 'w'"):
-        served(bundled_cell, settings.model_copy(update={"simulation": simulation}))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.interfaces import DeviceIdentity, TemperatureReading
+from drivers.interfaces import TemperatureReading
 from drivers.thermometers import sysfs
 from drivers.thermometers.sysfs import SysfsThermometer
 from hexacell.cell.devices import ThermometerSettings
@@ -42,12 +42,6 @@ async def room(path: Path, timeout_s: float) -> AsyncIterator[SysfsThermometer]:
 async def test_millidegrees_are_read(path, room, text, celsius):
     show(path, text)
     assert await room.read() == TemperatureReading(celsius, text.strip())
-
-
-async def test_the_identity_of_a_thermometer_names_its_file(path, room):
-    show(path, "21375\n")
-    assert await room.open() == DeviceIdentity("thermometer room", "sysfs", str(path))
-    assert room.name == "room"
 
 
 @pytest.mark.parametrize(

@@ -10,14 +10,6 @@ from hexacell.cell.loader import load_cell
 from hexacell.errors import ExitCode, FileError, HexacellError, SeveralErrors
 
 
-def test_a_valid_cell_file_is_loaded(load_text, cell_text, cell_path):
-    cell = load_text(cell_text)
-    assert cell.path == cell_path
-    assert cell.text == cell_text
-    assert cell.settings.name == "simulated-hexaglide"
-    assert cell.settings.limits.tilt_deg == 45.0
-
-
 @pytest.mark.parametrize("name", ["sub/robot.toml", "/etc/robot.toml"])
 def test_config_is_beside_the_cell_file_or_at_an_absolute_path(load_changed, cell_path, name):
     cell = load_changed(("simulated-hexaglide.controller.toml", name))
@@ -218,20 +210,6 @@ def _file_errors(several: SeveralErrors) -> list[FileError]:
 
 PIECES = [b"[", b"]", b"{", b"}", b'"', b"'", b"=", b",", b".", b"\n", b"#", b"\\", b"nan"]
 PIECES += [b"-1", b"true", b"[[a]]\n", b'"""', b"1e999"]
-pieces = st.sampled_from(PIECES) | st.binary(max_size=3)
-
-
-@given(edits=st.lists(st.tuples(st.floats(0, 1), st.integers(0, 40), pieces), min_size=1, max_size=4))
-def test_damaged_files_give_plain_errors_only(cell_text, cell_path, edits):
-    raw = cell_text.encode()
-    for where, length, piece in edits:
-        start = int(where * len(raw))
-        raw = raw[:start] + piece + raw[start + length :]
-    cell_path.write_bytes(raw)
-    try:
-        load_cell(cell_path)
-    except HexacellError as error:
-        assert str(error).startswith(str(cell_path))  # noqa: PT017 - loading may also succeed
 
 
 def test_a_day_in_the_place_of_the_mechanism_is_refused_by_its_line(cell_text, load_text):

@@ -4,10 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from hexacell.cell.devices import LinearEncoderSettings, RotaryEncoderSettings
+from hexacell.cell.devices import RotaryEncoderSettings
 from hexacell.cell.loader import describe, load_cell
 from hexacell.errors import FileError
-from hexacell.kinematics.parameters import JointUnit
 from hexacell.robot.stated import stated_effects
 
 CONFIGS = Path(__file__).parents[3] / "configs"
@@ -60,12 +59,6 @@ def test_a_length_check_is_of_encoders_of_lengths(copied) -> None:
     section = f"[length_check]\n{values}[simulation]"
     with pytest.raises(FileError, match="those of this mechanism are of angles"):
         load_cell(copied("rotary-cranks", ("[simulation]", section)))
-
-
-def test_a_count_is_a_length_or_an_angle() -> None:
-    assert (LinearEncoderSettings().step, LinearEncoderSettings().unit) == (1e-3, JointUnit.MM)
-    rotary = RotaryEncoderSettings(counts_per_turn=3600)
-    assert (rotary.step, rotary.unit) == (0.1, JointUnit.DEG)
 
 
 def test_an_inch_machine_tells_angles_in_degrees(copied) -> None:

@@ -30,10 +30,6 @@ def load_fixture(cell_text, load_text):
     return load
 
 
-def test_a_cell_needs_no_fixture(load_text, cell_text) -> None:
-    assert load_text(without_fixture(cell_text)).settings.length_check is None
-
-
 def test_what_is_not_said_is_assumed_as_of_a_shop(load_fixture) -> None:
     fixture = load_fixture().settings.length_check
     assert fixture.second_seat == pytest.approx((150.012, 0.0, 500.0))

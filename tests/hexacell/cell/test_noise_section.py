@@ -12,12 +12,6 @@ def load_noise(load_changed):
     return lambda lines: load_changed((STATED, lines)).settings
 
 
-def test_a_cell_measures_its_noise_unless_it_says_otherwise(load_noise) -> None:
-    noise = load_noise(STATED).noise
-    assert (noise.standstill_readings, noise.revisits) == (40, 6)
-    assert (noise.figures, noise.averaged_windows) == ("stated", 1)
-
-
 def test_one_figure_is_that_of_all_instruments_of_a_kind(load_noise) -> None:
     noise = noise_of(load_noise("encoder_mm = 0.02\ngauge_mm = 0.005\n"))
     assert noise.encoders.tolist() == [0.02] * 6

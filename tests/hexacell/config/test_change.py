@@ -35,15 +35,6 @@ def test_a_proposal_describes_the_change_and_writes_nothing(
     assert "gain" not in proposal.diff
 
 
-def test_a_relative_path_is_kept_whole(
-    config: Path, geometry: Geometry, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(config.parent)
-    name = Path(config.name)
-    found = propose((name,), NATIVE, geometry, fingerprint_at_start=fingerprint(name))
-    assert found.path == config
-
-
 def test_a_config_that_changed_since_the_run_began_is_refused(config: Path, geometry: Geometry) -> None:
     start = fingerprint(config)
     config.write_text(config.read_text() + "# one more remark\n")

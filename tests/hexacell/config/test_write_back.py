@@ -14,7 +14,6 @@ from hexacell.config.write_back import commit, rollback
 from hexacell.errors import FileError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
-from tests.geometries import hexaglide_geometry
 from tests.native_config import NATIVE
 
 
@@ -47,22 +46,6 @@ def test_rollback_works_from_a_moved_run_folder(config: Path, run: Path, proposa
     commit(proposal, run)
     run.rename(run.parent / "archived")
     rollback(Receipt.of(run.parent / "archived"))
-    assert config.read_bytes() == proposal.text_before.encode()
-
-
-def test_commits_are_undone_one_after_another(
-    config: Path, run: Path, geometry: Geometry, proposal: ConfigChange
-) -> None:
-    first = commit(proposal, run)
-    further = NativeToml(HEXAGLIDE_PARAMETERS).read(config).geometry.interpolate_from(geometry, 2.0)
-    further = hexaglide_geometry(S=further["S"] + 1.0, B=further["B"], l=further["l"])
-    second = commit(
-        propose((config,), NATIVE, further, fingerprint_at_start=fingerprint(config)), run / "2"
-    )
-    with pytest.raises(FileError, match="changed since it was written"):
-        rollback(first)
-    rollback(second)
-    rollback(first)
     assert config.read_bytes() == proposal.text_before.encode()
 
 

@@ -170,15 +170,6 @@ def test_a_file_that_is_far_too_large_is_not_read(read):
         read(GOOD + 6_000_000 * "\n")
 
 
-def test_a_point_just_opened_may_have_one_row(read):
-    assert len(read(f"{HEADER}\n{ROWS[0]}\n", allow_partial=True)) == 1
-
-
-def test_other_mistakes_count_in_partial_files_too(read):
-    with pytest.raises(FileError, match="is here"):
-        read(f"{HEADER}\n{ROWS[0]}\n{ROWS[0]}\n", allow_partial=True)
-
-
 pieces = st.sampled_from(
     [",", "\n", '"', ";", "\r", "nan", "1e999", "-", "point", "\0", "\u0661", "_", " "]
 )

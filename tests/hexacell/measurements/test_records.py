@@ -1,7 +1,5 @@
 """Records as arrays, and invalid sets of them."""
 
-from operator import attrgetter
-
 import numpy as np
 import pytest
 
@@ -36,12 +34,3 @@ def test_points_are_grouped_in_the_order_of_measurement():
 def test_the_same_record_twice_is_refused():
     with pytest.raises(UsageError, match="two records of point 2, orientation 3"):
         MeasurementSet((record(2, 3), record(2, 4), record(2, 3, z=0.0)))
-
-
-@pytest.mark.parametrize(
-    "name", ["labels", "group", "poses.positions", "poses.rotations", "joints", "deviations"]
-)
-def test_arrays_cannot_be_changed(name):
-    array = attrgetter(name)(MeasurementSet((record(1, 1),)))
-    with pytest.raises(ValueError, match="read-only"):
-        array[0] = 0

@@ -15,7 +15,6 @@ from hexacell.run_process.messages import (
     EventRecorded,
     HostFailed,
     HostMessage,
-    LiveSnapshot,
     QuestionClosed,
     QuestionOpened,
     RunDescribed,
@@ -128,23 +127,6 @@ async def test_a_whole_run_is_told_and_commanded_over_the_socket(hosted) -> None
     ]
     assert client.told.count(QuestionClosed()) == sum(isinstance(m, QuestionOpened) for m in client.told)
     assert StatusChanged(status=Status.ENDED) in client.told
-
-
-async def test_gauges_are_shown_while_they_are_placed(hosted) -> None:
-    async with hosted() as run:
-        client = await run.client()
-        await client.until(asks(GaugePlacement))
-        shown = await client.until(
-            lambda one: isinstance(one, LiveSnapshot) and all(g.noise_mm is not None for g in one.gauges)
-        )
-        assert [(one.name, one.axis, one.unit, one.problem) for one in shown.gauges] == [
-            (axis, axis, "mm", "") for axis in "xyz"
-        ]
-        assert all(0.0 <= one.age_s < 60.0 and one.noise_mm < 0.01 for one in shown.gauges)
-        assert len(shown.encoders.positions) == 6
-        assert (shown.controller.estop, shown.controller.enabled) == (False, True)
-        await client.connection.leave(keep_running=False)
-        assert await run.serving is ExitCode.INTERRUPTED
 
 
 async def test_a_second_client_is_told_the_same_and_the_open_question(hosted) -> None:

@@ -8,7 +8,6 @@ from drivers.serial.shared_port import SharedSerialPorts
 from drivers.wire_trace import WireTrace
 from hexacell.errors import DeviceError
 from hexacell.services.devices.device_setup import device_addresses, devices_of, open_devices
-from procedures.devices.settling import read_all
 
 
 def test_axes_and_signs_are_the_files(make_site) -> None:
@@ -26,16 +25,6 @@ def test_axes_and_signs_are_the_files(make_site) -> None:
         (1, 1),
         (0, 1),
     ]
-
-
-async def test_connected_devices_answer_and_their_traffic_is_kept(make_site) -> None:
-    site = make_site()
-    async with open_devices(site.simulated.settings) as cell_now:
-        look = await read_all(cell_now.devices, cell_now.clock)
-        text = cell_now.trace.text()
-    assert len(cell_now.identities) == 10
-    assert look.gauges[0].raw in text
-    assert cell_now.clock.factor == 500.0
 
 
 async def test_if_one_device_cannot_be_opened_or_something_fails_all_are_closed(make_site) -> None:

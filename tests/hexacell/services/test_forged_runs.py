@@ -152,13 +152,6 @@ async def test_a_forged_journal_is_refused(finished, make_site, forgery: str) ->
     assert words in await refusal_of(site)
 
 
-async def test_what_is_not_forged_is_resumed(finished, make_site) -> None:
-    site = make_site()
-    site.write(finished.until(events.Identified), moved_from=finished)
-    ended = await site.calibrate(resume=True)
-    assert ended.kind == "ended"
-
-
 @pytest.mark.parametrize("name", ["proposal.json", "write-back.json", "lent/write-back.json"])
 async def test_a_file_that_names_another_config_leads_nowhere(finished, make_site, tmp_path, name) -> None:
     """Otherwise a rollback, or a proposal, would be written there."""

@@ -9,9 +9,7 @@ from procedures.run.keys import Phase, SetKey
 from procedures.run.readings import Reading
 from procedures.run.state import RunState, fold
 from procedures.steps import events
-from procedures.steps.base import StepWithoutMotion
 from procedures.steps.move import Expectation, Move
-from procedures.steps.registry import STEPS
 
 POSE = (0.0,) * 6
 ZERO = (0.0, 0.0, 0.0)
@@ -50,12 +48,6 @@ def test_a_set_with_fewer_records_than_planned_says_why():
     short = end.model_copy(update={"reason": "no safe straight line starts here"})
     lines = EventFormatter().lines(short, fold([*before, short]))
     assert lines[0].splitlines()[1:] == ["point 2 ends with 2 records: no safe straight line starts here"]
-
-
-def test_every_step_without_motion_says_what_it_does():
-    steps: list[Any] = [step for step in STEPS if issubclass(step, StepWithoutMotion)]
-    assert steps
-    assert all(activity(events.StepBegun(step=step())) for step in steps)
 
 
 def test_a_closed_set_is_summarized_in_one_line_and_that_of_the_identification_with_the_forecast():

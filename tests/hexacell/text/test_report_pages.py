@@ -4,8 +4,6 @@ from datetime import date
 from html.parser import HTMLParser
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from hexacell.errors import UsageError
 from hexacell.text.report.pages import (
@@ -18,7 +16,6 @@ from hexacell.text.report.pages import (
     Tone,
     html_of,
     pdf_of,
-    typst_of,
 )
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><rect width="9" height="9"/></svg>'
@@ -70,13 +67,6 @@ def test_hostile_texts_stay_texts() -> None:
         assert read(page).tags == read(html_of(report("plain"))).tags
         assert "".join(read(page).text).count(text) >= 9
         assert pdf_of(report(text)).startswith(b"%PDF")
-
-
-@settings(max_examples=20)
-@given(st.text(max_size=40))
-def test_any_text_makes_the_same_page_of_tags(text) -> None:
-    assert read(html_of(report(text))).tags == read(html_of(report("plain"))).tags
-    assert typst_of(report(text)).count("\n") == typst_of(report("plain")).count("\n")
 
 
 def test_both_are_the_same_each_time_and_need_nothing_else() -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,15 +12,11 @@ from drivers.errors import GaugeSilent
 from hexacell.campaign import planner
 from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.cell.recovery import UnattendedRecovery
-from hexacell.config.change import Receipt
-from hexacell.errors import ExitCode, Interruption
+from hexacell.errors import Interruption
 from hexacell.kinematics.pose import Pose
-from hexacell.services.run.calibration_run import calibration_of_run
 from procedures.engine.commands import Abort, Stop
 from procedures.engine.recovery import RecoveryPolicy
 from procedures.journal.journal import read_journal
-from procedures.replay.recorded_executor import RecordedStepExecutor
-from procedures.replay.replayer import Replayer, ReplayReport
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
 from procedures.steps import events
@@ -31,10 +25,9 @@ from procedures.steps.move import Move
 from procedures.steps.pilot import Pilot
 from procedures.steps.repeat import Repeat
 from procedures.steps.standstill import Standstill
-from tests.procedures.replay.test_replayer import numbered
 from tests.procedures.rig import MakeRig, Rig, new_rig
 from tests.procedures.runs.listening import PowerCut, happened, on, run_until, steps_of
-from tests.small_cell import choose_among_few, history_until
+from tests.small_cell import choose_among_few
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 ASKED: dict[str, Any] = {"noise__standstill_readings": 16, "noise__revisits": 6}
@@ -209,50 +202,6 @@ async def test_records_are_means_of_several_windows_where_that_is_allowed_and_pa
     assert state.set(P1).samples[:2] == (zero, second)
     noise = rig.calibration.known(state).robot_of(state).noise
     assert noise.encoder < 0.85 * 0.0045
-
-
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Rig:
-    """A whole run in which one gauge is noisier than stated."""
-    with pytest.MonkeyPatch.context() as patch:
-        choose_among_few(patch)
-        rig = new_rig(tmp_path_factory.mktemp("noise"), **ASKED)
-        noisy(rig, 0, 0.01)
-        asyncio.run(rig.run())
-    return rig
-
-
-@pytest.mark.slow
-def test_a_whole_run_with_a_noisy_gauge_passes(whole: Rig) -> None:
-    """Without the measured noise the residuals would be too large for what is stated."""
-    ended = read_journal(whole.folder.journal)[-1]
-    assert isinstance(ended, events.Ended)
-    assert ended.exit_code == ExitCode.DONE
-
-
-@pytest.mark.slow
-def test_the_result_has_the_measured_noise(whole: Rig) -> None:
-    (found,) = happened(whole, events.NoiseMeasured)
-    result = json.loads(whole.folder.result.read_text())
-    assert result["measured_noise"] == found.noise.model_dump(mode="json")
-
-
-@pytest.mark.slow
-def test_the_run_is_reproduced(whole: Rig, few_candidates: None, tmp_path: Path) -> None:
-    """Until three records are taken with what the measured noise says."""
-    history = history_until(read_journal(whole.folder.journal), events.RecordTaken, count=4)
-    started = history[0]
-    assert isinstance(started, events.RunStarted)
-    written = whole.config
-    [before] = Receipt.of(whole.folder.path).backup()
-    whole.cell.config_path.write_bytes(before)
-    calibration = calibration_of_run(whole.cell, started)
-    executor = RecordedStepExecutor.of(whole.cell, calibration, type(whole.folder)(tmp_path))
-    report = ReplayReport(whole.folder.journal, "hexacell", len(history))
-    asyncio.run(Replayer(executor, report).replay(numbered(history)))
-    whole.cell.config_path.write_bytes(written)
-    assert report.differences == []
-    assert report.results > 50
 
 
 @pytest.mark.parametrize(

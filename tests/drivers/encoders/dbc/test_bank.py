@@ -1,7 +1,6 @@
 """Encoders that a DBC file describes, on a virtual bus."""
 
 import asyncio
-import sys
 from collections.abc import Callable
 
 import pytest
@@ -10,7 +9,7 @@ from drivers.encoders.dbc import DbcBank
 from drivers.errors import BusError, InvalidSampleError, SilentNodeError
 from drivers.interfaces import DeviceIdentity
 from hexacell.cell.devices import LinearEncoderSettings
-from hexacell.errors import DeviceError, FileError, HexacellError, UsageError
+from hexacell.errors import DeviceError, FileError, UsageError
 from tests.drivers.encoders.dbc.conftest import SIGNALS, Wire, dbc_text
 from tests.waiting import until
 
@@ -137,9 +136,3 @@ async def test_without_bus_or_description_the_cell_file_is_told(settings):
         await DbcBank(settings()).open()
     with pytest.raises(UsageError, match="messages are not stated"):
         await DbcBank(LinearEncoderSettings(protocol="dbc")).open()
-
-
-async def test_without_the_extra_the_command_that_installs_it_is_told(settings, wire, monkeypatch):
-    monkeypatch.setitem(sys.modules, "cantools", None)
-    with pytest.raises(HexacellError, match=r"Type: pip install 'hexacell\[dbc\]'"):
-        await DbcBank(settings(wire.settings)).open()

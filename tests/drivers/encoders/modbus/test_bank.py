@@ -1,6 +1,5 @@
 """Encoders with Modbus RTU on a pseudo-terminal: requests, one instant, faults of devices and line."""
 
-import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -17,7 +16,7 @@ from drivers.wire_trace import TrafficDirection, WireTrace
 from hexacell.cell.described_devices import ModbusEncoderSettings
 from hexacell.cell.devices import LinearEncoderSettings
 from hexacell.clock import CellClock
-from hexacell.errors import HexacellError, UsageError
+from hexacell.errors import UsageError
 
 FAST = 100.0
 ONE_DEVICE = {"registers": (100, 102, 104, 106, 108, 110)}
@@ -204,12 +203,6 @@ async def test_what_the_cell_file_lacks_is_told():
         await ModbusBank(modbus_settings(port="/dev/nowhere")).open()
     with pytest.raises(UsageError, match="in which registers the encoders are"):
         await ModbusBank(LinearEncoderSettings(protocol="modbus")).open()
-
-
-async def test_without_the_extra_the_command_that_installs_it_is_told(simulated, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pymodbus", None)
-    with pytest.raises(HexacellError, match=r"Type: pip install 'hexacell\[modbus\]'"):
-        await simulated().driver.open()
 
 
 def test_requests_are_as_few_as_answers_allow():

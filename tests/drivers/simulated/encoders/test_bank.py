@@ -1,18 +1,15 @@
 """The real driver against the simulated bank: inside one process, over a pty, over a socket."""
 
 import asyncio
-import threading
 from functools import partial
 
 import pytest
 
 from drivers.errors import BusError
 from drivers.interfaces import EncoderSample
-from drivers.simulated.encoders.bank import SimulatedEncoderBank
 from drivers.simulated.encoders.object_dictionary import EVENTS_AND_SYNC
 from drivers.simulated.serial_line import PtyLine, SocketLine
 from drivers.simulated.slcan import SlcanServer
-from hexacell.clock import CellClock
 from hexacell.errors import DeviceError
 from tests.drivers.encoders.conftest import short_timeout
 from tests.drivers.simulated.encoders import faults
@@ -97,11 +94,3 @@ async def test_an_adapter_that_is_closed(make_bank, driver, samples, line, readi
         waiting = asyncio.ensure_future(bank.read())
     with pytest.raises(BusError, match=r"encoder bus slcan .*CAN adapter"):
         await waiting
-
-
-async def test_no_thread_is_left(settings, samples, reach):
-    before = set(threading.enumerate())
-    bank = SimulatedEncoderBank(settings, samples, CellClock())
-    bank.close()
-    bank.close()
-    assert set(threading.enumerate()) == before

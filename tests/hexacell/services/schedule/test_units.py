@@ -100,11 +100,6 @@ def test_any_path_is_one_word_of_a_crontab(file) -> None:
     )
 
 
-def test_units_have_plain_names() -> None:
-    assert scheduled(name="Zelle 3 (Süd)").unit == "hexacell-zelle-3-s-d"
-    assert scheduled(name="+").unit == "hexacell-cell"
-
-
 def test_what_is_no_time_of_day_is_refused() -> None:
     for text in ("24:00", "2:30", "02:60", "", "02:30:00", "-1:00", "02.30"):
         with pytest.raises(UsageError, match="no time of day"):

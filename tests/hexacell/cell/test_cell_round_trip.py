@@ -36,7 +36,7 @@ changes = st.fixed_dictionaries(
 )
 
 
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(changes=changes)
 def test_settings_dumped_and_described_load_as_the_same(load_text, cell_text, changes):
     stated = changed(load_text(cell_text).settings, changes)

@@ -76,7 +76,7 @@ def moved(geometry: Geometry, rows: list[int]) -> Geometry:
     return Geometry(geometry.parameters, vector)
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(st.data())
 def test_a_change_is_written_in_its_lines_alone_and_undone_bit_for_bit(real: Real, data) -> None:
     is_toml = real.layout.formats[0].name == "toml"

@@ -31,6 +31,7 @@ def test_noise_as_stated_stays_as_it_is() -> None:
     assert np.mean([one == NOISE for one in found]) == pytest.approx(0.99, abs=0.01)
 
 
+@pytest.mark.sample("2.0")
 @pytest.mark.parametrize("ratio", [2.0, 5.0])
 def test_larger_noise_is_found_with_its_size_and_freedom(ratio) -> None:
     random = np.random.default_rng(2)
@@ -39,6 +40,7 @@ def test_larger_noise_is_found_with_its_size_and_freedom(ratio) -> None:
     assert np.mean([one.freedom == 18 + 8 * 3 for one in found]) > 0.98
 
 
+@pytest.mark.sample("0.02")
 @pytest.mark.parametrize("size", [0.02, 0.05])
 def test_joints_that_stop_beside_what_encoders_show_are_told_from_noisy_readings(size) -> None:
     """They scatter along the directions in which the joints move the ball."""

@@ -38,7 +38,7 @@ EVENTS: tuple[Any, ...] = get_args(get_args(events.Event)[0])
 COMMANDS: tuple[Any, ...] = get_args(Command)
 SUBJECTS: tuple[Any, ...] = get_args(get_type_hints(Question)["subject"])
 SAME_EACH_TIME = settings(
-    max_examples=12,
+    max_examples=6,
     deadline=None,
     database=None,
     derandomize=True,
@@ -95,7 +95,7 @@ def test_every_command_arrives_as_it_was_given(kind: Any) -> None:
 def test_every_question_arrives_as_it_was_asked() -> None:
     subjects = set()
 
-    @settings(SAME_EACH_TIME, max_examples=200)
+    @settings(SAME_EACH_TIME, max_examples=100)
     @given(valid(Question))
     def arrives(question: Question) -> None:
         sent = QuestionOpened(question=question)

@@ -100,15 +100,6 @@ async def test_after_a_calibration_a_check_finds_it_good(finished, tmp_path) -> 
     assert (await replay(order.folder.path)).differences == []
 
 
-async def test_a_check_of_a_config_that_no_run_wrote_starts_from_the_drawing(make_site) -> None:
-    site = make_site()
-    ended = await site.calibrate(mode=Mode.CHECK)
-    [started] = site.happened(events.RunStarted)
-    assert started.accepted is None
-    assert ended.exit_code == ExitCode.OUT_OF_LIMITS
-    assert "position error at the task poses" in ended.line
-
-
 async def test_the_effects_of_an_accepted_result_are_those_of_its_records(make_cell, finished) -> None:
     cell = make_cell(uncertainty__encoder_scale_um_m=100.0)
     cell.config_path.write_bytes(finished.cell.config_path.read_bytes())

@@ -4,7 +4,6 @@ import logging
 from pathlib import Path
 
 from hexacell.cell.devices import ThermometerSettings
-from hexacell.services.run.calibration_run import preflight
 from hexacell.services.run.replay_run import replay
 from procedures.calibration.calibration import Mode
 from procedures.replay.replayer import Scope
@@ -35,9 +34,3 @@ async def test_temperatures_are_in_the_journal_and_do_not_change_its_replay(
         assert rails.problem.startswith("thermometer rails: cannot be read")
     replayed = await replay(site.folder.path, Scope.RESULTS)
     assert replayed.differences == []
-
-
-async def test_preflight_names_the_thermometers_that_answer(make_site, tmp_path) -> None:
-    site = make_site(thermometers=(in_the_room(tmp_path),))
-    found = await preflight(site.order().cell, Mode.CHECK, unattended=True)
-    assert found[-1].name == "thermometer room"

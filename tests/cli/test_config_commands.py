@@ -19,21 +19,6 @@ def cell(cell_folder):
     return load_cell(cell_folder.cell)
 
 
-def test_applied_and_undone(cell, typed_here) -> None:
-    run = propose_run(cell)
-    applied = typed_here("apply", run.folder.path)
-    assert (applied.code, cell.config_path.read_bytes()) == (0, run.after)
-    assert "approved by the command" in applied.out
-    assert "Restart or reload the controller before it moves" in applied.out
-    again = typed_here("apply", run.folder.path)
-    assert (again.code, "nothing was written" in again.out) == (0, True)
-    undone = typed_here("rollback", cell.path)
-    assert (undone.code, cell.config_path.read_bytes()) == (0, run.before)
-    assert "bit for bit, which undoes the run 2026-11-20T100000Z" in undone.out
-    restored = typed_here("rollback", cell.path, "--to", run.folder.path.name)
-    assert (restored.code, cell.config_path.read_bytes()) == (0, run.after)
-
-
 def test_programs_get_one_document(cell, typed_here) -> None:
     run = propose_run(cell)
     applied = typed_here("apply", run.folder.path, "--json").document

@@ -1,6 +1,5 @@
 """The log of a command: where it is asked for, and only there."""
 
-import logging
 import re
 
 LINE = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z (DEBUG|INFO|WARNING|ERROR) [\w.]+: .+")
@@ -45,10 +44,3 @@ def test_the_file_may_be_named_in_the_environment(typed_here, quick_cell, tmp_pa
     monkeypatch.setenv("HEXACELL_LOG_FILE", str(tmp_path / "hexacell.log"))
     typed_here("status", quick_cell.cell)
     assert "exit code 0" in (tmp_path / "hexacell.log").read_text()
-
-
-def test_afterwards_the_loggers_are_as_before(typed_here, quick_cell) -> None:
-    typed_here("status", quick_cell.cell, "-vv")
-    for package in ("hexacell", "procedures", "drivers"):
-        logger = logging.getLogger(package)
-        assert (logger.handlers, logger.level) == ([], logging.NOTSET)

@@ -57,14 +57,6 @@ def test_a_service_that_could_not_begin_is_not_written(schedule, units, tmp_path
     assert not units.exists()
 
 
-def test_metrics_may_be_written_into_their_folder(schedule, units, tmp_path) -> None:
-    (tmp_path / "metrics").mkdir()
-    assert schedule("--daily", "02:30", "--metrics", tmp_path / "metrics" / "cell.prom").code == 0
-    service = (units / UNITS[0]).read_text()
-    assert f'--metrics" "{tmp_path}/metrics/cell.prom"' in service
-    assert f'ReadWritePaths="{tmp_path}/metrics"' in service or "ReadWritePaths" not in service
-
-
 def test_for_cron_a_line_is_printed_and_nothing_written(schedule, cell_folder, units) -> None:
     outcome = schedule("--daily", "02:30", "--cron")
     assert outcome.out.splitlines()[-1].startswith("30 2 * * * cd ")

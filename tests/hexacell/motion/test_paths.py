@@ -1,16 +1,24 @@
-"""Paths with gauges at the ball: straight, over waypoints, or over the reference."""
+"""Paths with gauges at the ball, the way back, and routes of straight lines."""
 
 from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
 from hexacell.design.candidates import commands_for, orientations, reachable_targets
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.mechanism import inverse_kinematics
-from hexacell.kinematics.pose import PoseBatch
-from hexacell.motion.paths import WAYPOINT_PIECES, PathPlanner
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.motion import paths
+from hexacell.motion import paths as module
+from hexacell.motion.path_check import ball_position, is_clear
+from hexacell.motion.paths import WAYPOINT_PIECES, PathPlanner, find_route, next_return_move
 from hexacell.motion.trajectory import interpolate_line
+from hexacell.robot.model import robot_of
 
 TRAVEL_MM = 5.0
 BALL = np.array([0.0, 0.0, 550.0])
@@ -109,3 +117,125 @@ def test_there_is_no_path_from_a_command_out_of_reach(well, commands):
     planner = PathPlanner(well, beyond, beyond, BALL)
     assert not any(planner.plan(commands))
     assert list(planner.options(commands).via_reference(np.array([0, 1]))) == [None, None]
+
+
+TRAIL = [Pose(0, 0, 500, angle) for angle in (0, 5, 10, 15)]
+WAYPOINT = Pose(1, 2, 500, 7, 3, 0)
+
+
+@pytest.fixture
+def plan(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Stands in for the planner and the check of lines: straight lines are clear to some angles only."""
+
+    def planned(*waypoints: Pose, found: bool = True, clear_to: tuple[int, ...] = ()) -> list[float]:
+        asked: list[float] = []
+
+        def planner(_: Any, start: PoseBatch, *__: Any) -> Any:
+            asked.append(start.pose(0).a)
+            return SimpleNamespace(plan=lambda _: [SimpleNamespace(waypoints=waypoints) if found else None])
+
+        monkeypatch.setattr(paths, "PathPlanner", planner)
+        monkeypatch.setattr(paths, "is_clear", lambda _, __, end, ___: round(end.pose(0).a) in clear_to)
+        return asked
+
+    return planned
+
+
+def move(trail: list[Pose], departure: int) -> int | Pose:
+    nothing: Any = None
+    return next_return_move(nothing, np.zeros(3), PoseBatch.of(trail), departure)
+
+
+def test_straight_to_the_reference_where_that_is_safe(plan: Any) -> None:
+    plan()
+    assert move(TRAIL, 3) == 0
+
+
+def test_over_the_waypoints_of_the_path_and_then_to_the_reference(plan: Any) -> None:
+    asked = plan(WAYPOINT)
+    assert move(TRAIL, 3) == WAYPOINT
+    assert move([*TRAIL, WAYPOINT], 3) == 0
+    assert asked == pytest.approx([15.0, 15.0]), "planned from the last pose that was measured"
+
+
+def test_without_a_path_to_the_earliest_pose_that_is_clear(plan: Any) -> None:
+    plan(found=False, clear_to=(5, 10))
+    assert move(TRAIL, 3) == 1
+
+
+def test_without_any_clear_line_back_along_the_trail(plan: Any) -> None:
+    plan(found=False)
+    assert move(TRAIL, 3) == 2
+
+
+def test_off_the_planned_path_the_robot_returns_along_the_trail(plan: Any) -> None:
+    plan(WAYPOINT, clear_to=(0,))
+    assert move([*TRAIL, Pose(0, 0, 500, 20)], 3) == 0
+    plan(WAYPOINT)
+    assert move([*TRAIL, Pose(0, 0, 500, 20)], 3) == 3
+
+
+def at(place: float) -> PoseBatch:
+    return PoseBatch.of([Pose(place, 0.0, 500.0)])
+
+
+class Lines:
+    """Stands in for the check: only some lines are clear; a place is the x of its pose."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, *clear: tuple[float, float]) -> None:
+        self.clear = set(clear)
+        self.asked: list[tuple[float, float]] = []
+        monkeypatch.setattr(module, "is_clear", self)
+
+    def __call__(self, _: Any, start: PoseBatch, end: PoseBatch, reference: Any) -> bool:
+        line = float(start.positions[0, 0]), float(end.positions[0, 0])
+        self.asked.append(line)
+        return line in self.clear
+
+
+VIA = [at(1.0), at(2.0), at(3.0)]
+START, GOAL = at(0.0), at(9.0)
+
+
+@pytest.mark.parametrize(
+    ("clear", "route"),
+    [
+        ([(0, 9)], []),
+        ([(0, 9), (0, 1), (1, 9)], []),
+        ([(0, 2), (2, 9)], [1]),
+        ([(0, 1), (1, 3), (3, 9)], [0, 2]),
+        ([(0, 1), (1, 2), (2, 3), (3, 9), (0, 3)], [2]),
+        ([(0, 1), (1, 2), (2, 3)], None),
+        ([(9, 0)], None),
+        ([], None),
+    ],
+)
+def test_the_fewest_lines(monkeypatch: pytest.MonkeyPatch, clear: Any, route: list[int] | None) -> None:
+    lines = Lines(monkeypatch, *clear)
+    nothing: Any = None
+    assert find_route(nothing, START, GOAL, VIA) == route
+    assert len(lines.asked) == len(set(lines.asked)), "no line is checked twice"
+
+
+@pytest.fixture(scope="module")
+def belief() -> Any:
+    return robot_of(load_cell(bundled_config("simulated-hexaglide"))).belief()
+
+
+def test_a_route_over_level_poses_on_the_papers_robot(belief: Any) -> None:
+    """Far apart and with another tilt: each line of the route passes the check."""
+    start, goal = (
+        PoseBatch.of([Pose(100.0, -100.0, 500.0, 25.0, 20.0, 0.0)]),
+        PoseBatch.of([Pose(-100.0, 100.0, 500.0)]),
+    )
+    via = [PoseBatch.of([Pose(100.0, -100.0, 500.0)]), goal]
+    way = find_route(belief, start, goal, via)
+    assert way is not None
+    stops = [start, *(via[row] for row in way), goal]
+    assert all(is_clear(belief, here, there) for here, there in pairwise(stops))
+
+
+def test_the_ball_of_a_robot_as_drawn_is_where_it_is_commanded(belief: Any) -> None:
+    ball = ball_position(belief, PoseBatch.of([Pose(10.0, -20.0, 550.0, 5.0, 0.0, 0.0)]))
+    assert ball is not None
+    assert np.abs(ball - [10.0, -20.0, 550.0]).max() < 1e-6

@@ -1,9 +1,11 @@
-"""Failures to write or read are reported in plain words; the file stays unchanged."""
+"""Failures to write and read, and what processes left that died meanwhile."""
 
 import errno
 import os
 import resource
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -127,3 +129,95 @@ def test_pipes_folders_and_absent_files_are_refused_at_once(tmp_path: Path) -> N
             atomic_files.write_atomically(tmp_path / name, b"new")
     with pytest.raises(FileError, match="does not exist"):
         atomic_files.write_atomically(tmp_path / "no" / "folder", b"new")
+
+
+@pytest.fixture
+def died(monkeypatch: pytest.MonkeyPatch) -> Callable[[Path], None]:
+    class Death(BaseException):
+        pass
+
+    def die(_: object, __: object) -> None:
+        raise Death
+
+    def write(path: Path) -> None:
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "replace", die)
+            patch.setattr(Path, "unlink", lambda *_, **__: None)
+            with pytest.raises(Death):
+                atomic_files.write_atomically(path, b"half a thought")
+
+    return write
+
+
+def test_temporaries_of_one_file_are_removed_and_no_others(path: Path, died: Any) -> None:
+    other = path.with_name("other.toml")
+    died(path)
+    died(path)
+    died(other)
+    assert len(names(path.parent)) == 4
+    atomic_files.remove_stale_temporaries(path)
+    assert len(names(path.parent)) == 2
+    assert path.read_bytes() == b"old"
+    atomic_files.remove_stale_temporaries(other)
+    assert names(path.parent) == [path.name]
+
+
+def test_temporaries_of_the_target_of_a_link_are_removed(path: Path, tmp_path: Path, died: Any) -> None:
+    link = tmp_path / "elsewhere" / "link.toml"
+    link.parent.mkdir()
+    link.symlink_to(path)
+    died(link)
+    atomic_files.remove_stale_temporaries(link)
+    assert names(path.parent) == [path.name, "elsewhere"]
+
+
+def test_all_temporaries_in_a_folder_are_removed(path: Path, died: Any) -> None:
+    died(path)
+    died(path.with_name("other.toml"))
+    atomic_files.remove_stale_temporaries(path.parent)
+    assert names(path.parent) == [path.name]
+
+
+def test_temporaries_in_a_read_only_folder_are_left(ordinary_folder: Path, died: Any) -> None:
+    died(ordinary_folder / "file")
+    ordinary_folder.chmod(0o500)
+    atomic_files.remove_stale_temporaries(ordinary_folder / "file")
+    assert len(names(ordinary_folder)) == 1
+
+
+def test_read_if_present(path: Path, tmp_path: Path) -> None:
+    assert atomic_files.read_if_present(path) == b"old"
+    assert atomic_files.read_if_present(tmp_path / "absent") is None
+    with pytest.raises(FileError, match="not a file"):
+        atomic_files.read_if_present(tmp_path)
+    with pytest.raises(FileError, match="a part of the path is not a folder"):
+        atomic_files.read_if_present(path / "below")
+
+
+def test_text_keeps_its_line_ends_and_the_error_has_the_line_that_is_not_utf8(tmp_path: Path) -> None:
+    path = tmp_path / "text"
+    path.write_bytes(b"\xef\xbb\xbfa\r\nb\n")
+    assert atomic_files.read_text(path) == "a\r\nb\n"
+    path.write_bytes("a\nb\nmäßig\n".encode("latin-1"))
+    with pytest.raises(FileError, match="not UTF-8") as caught:
+        atomic_files.read_text(path)
+    assert caught.value.line == 3
+
+
+def test_folders_are_made_with_those_above(tmp_path: Path) -> None:
+    atomic_files.create_folder_durably(tmp_path / "a" / "b")
+    atomic_files.create_folder_durably(tmp_path / "a" / "b")
+    assert (tmp_path / "a" / "b").is_dir()
+    (tmp_path / "file").write_bytes(b"")
+    for name in ("file", "file/below"):
+        with pytest.raises(FileError, match="the folder cannot be made"):
+            atomic_files.create_folder_durably(tmp_path / name)
+
+
+def test_the_name_of_every_new_folder_is_synced_in_its_parent(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[Path] = []
+    monkeypatch.setattr(atomic_files, "sync_folder", synced.append)
+    atomic_files.create_folder_durably(tmp_path / "runs" / "cell" / "run")
+    assert set(synced) == {tmp_path, tmp_path / "runs", tmp_path / "runs" / "cell"}

@@ -1,15 +1,21 @@
-"""Devices unplugged and plugged in again in an unattended run: the run recovers by itself."""
+"""Devices unplugged and plugged in again, mistakes with gauges, thermometers that fail."""
 
+import logging
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from hexacell.cell.devices import ThermometerSettings
 from hexacell.cell.recovery import Action
-from hexacell.cell.simulation import FaultKind
-from hexacell.errors import ExitCode
+from hexacell.cell.simulation import FaultKind, SimulatedFault
+from hexacell.errors import ExitCode, HexacellError
+from hexacell.services.run.replay_run import replay
+from procedures.calibration.calibration import Mode
 from procedures.devices.reconnection import DeviceReplaced
 from procedures.engine.engine import Listener
+from procedures.replay.replayer import Scope
 from procedures.run.trips import RobotNotStopped
 from procedures.steps import events
 
@@ -99,3 +105,50 @@ async def test_another_device_than_the_run_was_begun_with_is_refused(finished, m
         await site.calibrate(resume=True)
     assert refusal.value.exit_code is ExitCode.HARDWARE
     assert site.happened(events.StepBegun) == [e for e in history if isinstance(e, events.StepBegun)]
+
+
+MISTAKES: list[tuple[FaultKind, str, str, int]] = [
+    ("reversed", "x", "gauge x: counts the wrong way", 1),
+    ("exchanged", "y", "gauges y, z: are exchanged", 1),
+    ("frozen", "z", "gauge z: does not follow the ball", 1),
+    ("in inches", "x", "gauge x: answers in inch", 0),
+    ("off its middle", "y", r"gauge y: its plunger stands [34]\.\d mm from the middle", 0),
+]
+"""What, of which gauge, what is said, and how many records were taken before."""
+
+
+@pytest.mark.parametrize(("kind", "gauge", "words", "records"), MISTAKES)
+async def test_a_mistake_at_the_start_is_named(make_site, kind, gauge, words, records) -> None:
+    fault = SimulatedFault(kind=kind, device=gauge)
+    site = make_site(stations__trial_mm=1.0, simulation__faults=(fault,))
+    with pytest.raises(HexacellError, match=words) as refusal:
+        await site.calibrate()
+    assert refusal.value.exit_code is ExitCode.HARDWARE
+    taken = site.happened(events.RecordTaken) if site.folder.journal.exists() else []
+    assert len(taken) == records
+
+
+def in_the_room(tmp_path: Path) -> ThermometerSettings:
+    path = tmp_path / "temp1_input"
+    path.write_text("20125\n")
+    return ThermometerSettings(name="room", path=str(path))
+
+
+async def test_temperatures_are_in_the_journal_and_do_not_change_its_replay(
+    make_site, tmp_path, caplog
+) -> None:
+    nowhere = ThermometerSettings(name="rails", path=str(tmp_path / "nowhere"))
+    site = make_site(thermometers=(in_the_room(tmp_path), nowhere))
+    with caplog.at_level(logging.WARNING):
+        await site.calibrate(mode=Mode.CHECK)
+    [warning] = [record.getMessage() for record in caplog.records if "thermometer" in record.getMessage()]
+    assert warning.startswith("thermometer rails: cannot be read: it does not exist")
+    [started] = site.happened(events.RunStarted)
+    assert [one.name for one in started.devices if one.protocol == "sysfs"] == ["thermometer room"]
+    for sampled in site.happened(events.RecordTaken):
+        room, rails = sampled.reading.temperatures
+        assert (room.name, room.celsius, room.raw, room.problem) == ("room", 20.125, "20125", "")
+        assert (rails.name, rails.celsius) == ("rails", None)
+        assert rails.problem.startswith("thermometer rails: cannot be read")
+    replayed = await replay(site.folder.path, Scope.RESULTS)
+    assert replayed.differences == []

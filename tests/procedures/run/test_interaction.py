@@ -1,14 +1,15 @@
-"""Questions: what the broker accepts as an answer, and what an unattended run reports instead of one."""
+"""Questions: what is accepted as an answer; work is completed despite cancellation."""
 
 import asyncio
 
 import pytest
 
 from hexacell.cell.recovery import Action
-from hexacell.errors import AnswerNeeded, ExitCode
+from hexacell.errors import AnswerNeeded, DeviceError, ExitCode
 from hexacell.kinematics.pose import Pose
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.engine.commands import QuestionBroker, UnattendedOperator
+from procedures.run.cancellation import shielded
 from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import (
     GaugePlacement,
@@ -70,3 +71,38 @@ async def test_an_empty_answer_is_the_default() -> None:
     assert broker.open.subject == GaugePlacement(2, Pose(1.0, 2.0, 3.0), "point 2")
     assert broker.answer(None)
     assert await asking == "placed"
+
+
+async def work(turns: int, done: list[int]) -> int:
+    for _ in range(turns):
+        await asyncio.sleep(0)
+    done.append(turns)
+    return turns
+
+
+@pytest.mark.parametrize("times", [1, 2, 4])
+async def test_shielded_work_is_completed_before_the_cancellation_is_raised(times: int) -> None:
+    done: list[int] = []
+    task = asyncio.create_task(shielded(work(8, done)))
+    for _ in range(times):
+        await asyncio.sleep(0)
+        task.cancel()
+    assert done == []
+    with pytest.raises(asyncio.CancelledError):
+        await task
+    assert done == [8]
+
+
+async def test_an_error_of_cancelled_shielded_work_is_raised() -> None:
+    cancelled = asyncio.Event()
+
+    async def fail() -> None:
+        await cancelled.wait()
+        raise DeviceError("broken")
+
+    task = asyncio.create_task(shielded(fail()))
+    await asyncio.sleep(0)
+    task.cancel()
+    cancelled.set()
+    with pytest.raises(DeviceError):
+        await task

@@ -11,11 +11,10 @@ from drivers.simulated.linuxcnc.state import MotionRefused
 from drivers.simulated.physics import RobotPhysics
 from hexacell.cell.simulation import SoftLimits
 from hexacell.clock import CellClock
-from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import ConfigLayout
 from hexacell.errors import FileError
 from hexacell.kinematics import rotations
-from hexacell.kinematics.forward import ForwardResult, continue_solution
+from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.mechanism import Mechanism, joint_zeros
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -29,16 +28,14 @@ LINE_MM = 0.2
 
 MOST_STEPS = 1024
 
-ROUNDS = 4
-"""In which the pose for joints with corrections is found."""
-
 
 @dataclass(eq=False)
 class SimulatedMachine:
     """The machine behind a controller that reads its geometry whenever it is switched on.
 
     With corrections in its config it sends the joints elsewhere than it reports: pose and joints that it
-    reports are those commanded. From which side the joints came when it was switched on, it does not know.
+    reports are those commanded. Corrections that it reads take effect with the next motion, and backlash
+    with the first motion of a joint.
 
     Attributes:
         config: the file, or the files, with its geometry, in ``layout``.
@@ -63,9 +60,6 @@ class SimulatedMachine:
         self._geometry = self.layout.read(*self.config)
         self._line = PoseBatch.of([self.start, self.start])
         self._directions: Array = np.zeros((2, 6))
-        self._sent: Array = np.zeros((2, 6))
-        if not self._geometry.corrections.are_none:
-            self._take(self._geometry, self._joints(self._line[[0]]), self._line[[0]], self._geometry)
         self._lock = threading.Lock()
         self._stop_count = 0
         self._stopped = threading.Event()
@@ -95,7 +89,7 @@ class SimulatedMachine:
             if self._stop_count != stop_count:
                 return
             self._stopped.clear()
-            self._line, self._sent, self._directions = line, joints, directions
+            self._line, self._directions = line, directions
             motion = self.physics.start_motion(joints, duration_s)
         self.clock.wait(motion.duration_s, self._stopped)
 
@@ -129,43 +123,20 @@ class SimulatedMachine:
         with self._lock:
             here = self._pose_now()
             joints = self._joints(here)
-            if not self._geometry.corrections.are_none:
-                row, share = self._place()
-                joints = ((1.0 - share) * self._sent[row] + share * self._sent[row + 1])[None]
-            self._take(self.layout.read(*self.config), joints, here, self._geometry)
+            new = self.layout.read(*self.config)
+            found = continue_solution(
+                self.mechanism, new.geometry, joints, start=here, start_geometry=self._geometry.geometry
+            )
+            if not found.found[0]:
+                raise FileError(
+                    "this geometry has no pose at the present joint variables", subject=self.config[0]
+                )
+            self._geometry = new
+            self._directions = self._directions[[self._place()[0] + 1] * 2]
+            self._line = found.poses[[0, 0]]
 
     def home(self) -> None:
         """The encoders are absolute: nothing to do."""
-
-    def _take(
-        self, new: ControllerGeometry, joints: Array, here: PoseBatch, old: ControllerGeometry
-    ) -> None:
-        """Take what the config states while the joints (1, 6) stand where they were sent."""
-        found = self._pose_at(new, joints, here, old)
-        if not found.found[0]:
-            raise FileError(
-                "this geometry has no pose at the present joint variables", subject=self.config[0]
-            )
-        self._geometry = new
-        self._line = found.poses[[0, 0]]
-        self._sent, self._directions = joints[[0, 0]], np.zeros((2, 6))
-
-    def _pose_at(
-        self, new: ControllerGeometry, joints: Array, here: PoseBatch, old: ControllerGeometry
-    ) -> ForwardResult:
-        """The pose for which a controller would send the joints (1, 6), but for their backlash."""
-        found = continue_solution(
-            self.mechanism, new.geometry, joints, start=here, start_geometry=old.geometry
-        )
-        for _ in range(0 if new.corrections.are_none else ROUNDS):
-            if not found.found[0]:
-                break
-            own = self.mechanism.inverse(new.geometry, new.branch, found.poses)
-            added = with_longer_legs(self.mechanism, new, found.poses, own) - own
-            found = continue_solution(
-                self.mechanism, new.geometry, joints - added, start=found.poses, start_geometry=new.geometry
-            )
-        return found
 
     def _place(self) -> tuple[int, float]:
         """The row of the line that the present progress of the joints is behind, and how far."""

@@ -9,6 +9,7 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.config.change import ConfigChange, propose
 from hexacell.config.layout import fingerprint
+from hexacell.kinematics.corrections import Corrections
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot.model import config_layout, robot_of
 from hexacell.runs.run_folder import RunFolder, runs_folder
@@ -55,16 +56,17 @@ def propose_run(
     shift_mm: float = 0.25,
     gates: tuple[AcceptanceGate, ...] = (MET,),
     verdict: Verdict | None = Verdict.PASS,
+    corrections: Corrections | None = None,
     **verification: Any,
 ) -> ProposedRun:
-    """A run that proposes every number of the config of now, shifted."""
+    """A run that proposes every number of the config of now, shifted, and corrections."""
     folder = RunFolder(runs_folder(cell) / name)
     folder.create(cell)
     layout = config_layout(cell.settings)
     found = layout.read(*cell.config_paths).geometry
     after = Geometry(found.parameters, found.vector + shift_mm)
     start = fingerprint(*cell.config_paths)
-    change = propose(cell.config_paths, layout, after, fingerprint_at_start=start)
+    change = propose(cell.config_paths, layout, after, corrections, fingerprint_at_start=start)
     change.save(folder.proposal)
     with Journal(folder.journal) as journal:
         for event in _history(cell, change, gates, verdict, verification):
@@ -82,7 +84,7 @@ def _history(
     calibration = Calibration(cell.settings, robot_of(cell), Mode.OPTIMISE, effort=FEW_CHOICES)
     history: list[events.Event] = [
         run_started(cell, calibration, ()).model_copy(update={"software": "hexacell 0"}),
-        events.Proposed(gates=gates, written=change.after),
+        events.Proposed(gates=gates, written=change.after, corrections=change.corrections_after),
     ]
     if verdict is not None:
         judged = Verification(verdict=verdict, **({"before_mm": 1.0, "after_mm": 0.1} | verification))

@@ -1,11 +1,13 @@
 """Proposals applied after their run: bit for bit, under the run's own gates, never over an edit."""
 
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from hexacell.config.change import ConfigEditedSince, Receipt
+from hexacell.config.write_record import NumberChange
 from hexacell.errors import (
     AnswerNeeded,
     CellBusy,
@@ -15,10 +17,16 @@ from hexacell.errors import (
     UsageError,
     WriteBackUndone,
 )
+from hexacell.kinematics.corrections import Corrections
+from hexacell.robot.model import config_layout
 from hexacell.runs.cell_lock import cell_lock
 from hexacell.runs.run_folder import RunFolder
+from hexacell.services.write_back.config_history import config_history
+from hexacell.services.write_back.config_rollback import roll_back_config
 from hexacell.services.write_back.proposals import COMMAND, apply_proposal, later_approval, read_proposal
 from hexacell.storage import atomic_files
+from hexacell.text.config_changes import applied_text, versions_text
+from hexacell.text.screens.questions import question_view
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import Verdict
 from procedures.engine.commands import UnattendedOperator
@@ -131,6 +139,48 @@ async def test_an_edit_is_shown_number_by_number_and_kept(cell) -> None:
     assert "+l = [1234.5," in versions.edit
     assert cell.config_path.read_bytes() == edited
     assert not (run.folder.path / "write-back.json").exists()
+
+
+CORRECTED = Corrections(
+    backlash=(0.0, 0.0, 0.102, 0.0, 0.0, 0.0), compliance_um_n=(0.3,) * 6, weight_n=120.0
+)
+
+
+async def test_corrections_are_shown_written_recorded_and_undone_with_the_geometry(cell) -> None:
+    run = propose_run(cell, gates=(DOUBTFUL,), shift_mm=0.01, corrections=CORRECTED)
+    person, layout = Person(), config_layout(cell.settings)
+    applied = await apply_proposal(read_proposal(run.folder), person)
+    (question,) = person.asked
+    view = question_view(question, None)
+    for text in (view.change, applied_text(applied)):
+        assert "backlash of joint 3: 0 -> 0.102 mm\n" in text
+        assert "weight: 0 -> 120 N\n" in text
+    assert layout.read(cell.config_path).corrections == CORRECTED
+    (write,) = config_history(cell).writes
+    assert write.record.numbers_changed == 42 + 1 + 6 + 1
+    assert write.record.largest == NumberChange(name="backlash of joint 3", change=0.102, unit="mm")
+    roll_back_config(cell)
+    assert cell.config_path.read_bytes() == run.before
+
+
+async def test_an_edit_of_corrections_is_shown_and_kept(cell) -> None:
+    run = propose_run(cell, corrections=CORRECTED)
+    edited = run.before + b"\n[corrections]\nbacklash = [0.0, 0.0, 0.2, 0.0, 0.0, 0.0]\n"
+    cell.config_path.write_bytes(edited)
+    with pytest.raises(ConfigEditedSince) as refusal:
+        await apply(run, Person())
+    table = versions_text(refusal.value.versions)
+    assert re.search(r"backlash of joint 3 +0\.000000 +0\.102000 +0\.200000  edited by hand", table)
+    assert re.search(r"weight  +0\.000000 +120\.000000 +0\.000000\n", table)
+    assert cell.config_path.read_bytes() == edited
+
+
+async def test_corrections_that_are_not_those_of_the_journal_are_refused(cell) -> None:
+    run = propose_run(cell, corrections=CORRECTED)
+    other = propose_run(cell, "2026-11-20T110000Z", corrections=Corrections(backlash=(1.0,) * 6))
+    run.folder.proposal.write_bytes(other.folder.proposal.read_bytes())
+    with pytest.raises(FileError, match="not the one of its journal"):
+        await apply(run)
 
 
 async def test_an_edit_that_is_no_config_is_shown_too(cell) -> None:

@@ -1,17 +1,26 @@
-"""Information of planned sets and error at the task poses, compared with the estimator."""
+"""Forecasts of a plan against the estimator, campaigns and dry runs on virtual robots."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from hexacell.campaign.budget import usual_move_seconds
 from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.forecast import PlannedInformation
+from hexacell.campaign.task_accuracy import planned_systematic_mm
+from hexacell.cell.uncertainty import UncertaintySettings
+from hexacell.config.interface import ControllerGeometry
 from hexacell.design.criteria import add_information
+from hexacell.dry_run.campaign import VirtualCampaign, dry_run
 from hexacell.identification.diagnostics.pose_accuracy import predicted_accuracy
 from hexacell.identification.estimator import estimate_online
+from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record
-from hexacell.robot.virtual_robot import VirtualRobot
+from hexacell.robot.model import make_robot
+from hexacell.robot.stated import stated_effects
+from hexacell.robot.virtual_robot import VirtualRobot, exact_records, robots_within_tolerances
+from tests.geometries import hexaglide_geometry
 from tests.hexacell.campaign.conftest import TWO_POINTS, at_two_points
 
 
@@ -96,3 +105,123 @@ def test_what_is_known_beside_the_next_record_is_all_that_is_planned_without_it(
     taken = MeasurementSet(tuple(replace(record, orientation=row) for row in range(1, 16)))
     at_end = replace(state, measurements=taken, done=frozenset({2}))
     np.testing.assert_array_equal(plan.forecaster.known_beside_next(belief, at_end), belief.covariance)
+
+
+THREE_POINTS = ((0.0, -200.0, 550.0), (100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
+
+
+@pytest.fixture(scope="module")
+def ordinary(make_plan):
+    """The plan of a machine with the effects of an ordinary one."""
+    plan = make_plan(identification__points=THREE_POINTS)
+    uncertainty = UncertaintySettings(grade="ordinary")
+    settings = plan.settings.model_copy(update={"uncertainty": uncertainty})
+    return replace(plan, settings=settings, robot=plan.robot.with_errors_of(settings))
+
+
+def test_exact_records_are_those_of_a_virtual_robot_without_errors_and_noise(make_plan) -> None:
+    robot = make_plan().robot
+    silent = replace(robot, noise=replace(robot.noise, encoder=0.0, gauge_mm=0.0))
+    commands = [Pose(100.0, -100.0, 500.0), Pose(101.0, -100.0, 499.0, 5.0, -8.0, 12.0)]
+    virtual = VirtualRobot(silent, robot.commanding)
+    measured = []
+    for orientation, command in enumerate(commands, start=1):
+        virtual.place(command)
+        measured.append(virtual.measure(2, orientation))
+    found = [*exact_records(robot, 2, robot.from_commands(commands))]
+    assert [one.id for one in found] == [(2, 1), (2, 2)]
+    for one, expected in zip(found, measured, strict=True):
+        assert one.pose.as_tuple() == pytest.approx(expected.pose.as_tuple(), abs=1e-9)
+        assert one.joints == pytest.approx(expected.joints, abs=1e-6)
+        assert one.deviation == pytest.approx(expected.deviation, abs=1e-6)
+
+
+def test_it_is_that_of_a_campaign_that_was_carried_out(ordinary, paper) -> None:
+    """The planned poses are not those that are chosen, so that it is only about the same."""
+    campaign = VirtualCampaign(
+        ordinary, VirtualRobot(ordinary.robot, paper.actual, np.random.default_rng(2))
+    )
+    campaign.carry_out()
+    estimate = ordinary.estimate(campaign.state)
+    budget = ordinary.task.budget(estimate.identification, estimate.belief, ordinary.robot.effects)
+    assert ordinary.systematic_mm == pytest.approx(budget.systematic_mm, rel=0.4)
+    forecast = ordinary.forecast(campaign.state)
+    assert forecast.systematic_mm == ordinary.systematic_mm
+    expanded = 2.0 * np.hypot(forecast.now_mm, ordinary.systematic_mm)
+    assert forecast.expanded_mm(forecast.now_mm) == pytest.approx(expanded)
+    assert forecast.expanded_mm(forecast.now_mm) == pytest.approx(budget.expanded_mm, rel=0.4)
+
+
+def test_an_earlier_result_shares_its_constant_effects(ordinary) -> None:
+    """A prior that had the effects as well, and is much better known than the records make it."""
+    sets, task = ordinary.planned_sets, ordinary.task
+    alone = planned_systematic_mm(ordinary.robot, task, sets)
+    known = replace(ordinary.robot.prior, covariance=1e-6 * ordinary.robot.prior.covariance)
+    robot = replace(ordinary.robot, known=known)
+    zero = np.zeros((35, 6))
+    unaware = planned_systematic_mm(robot, task, sets, {"scale of each encoder": zero})
+    aware = planned_systematic_mm(robot, task, sets, {"scale of each encoder": zero + 1e-3})
+    assert None not in {alone, unaware, aware}
+    assert aware != pytest.approx(unaware, rel=0.01)
+
+
+def test_a_task_that_nobody_reaches_has_no_uncertainty(ordinary) -> None:
+    far = replace(ordinary.task, poses=ordinary.robot.from_commands([Pose(0.0, 0.0, 5000.0)]))
+    assert planned_systematic_mm(ordinary.robot, far, ordinary.planned_sets) is None
+
+
+SEED = {"identification__seed": 2}  # whose first robot can be measured
+
+
+@pytest.fixture(scope="module")
+def result():
+    return dry_run(at_two_points(**SEED))
+
+
+def test_the_result_is_that_of_a_campaign(result, campaign, two_points):
+    outlook = two_points.forecast(campaign[-1].state)
+    assert result.robots == 1
+    assert result.points == 2
+    assert 12 <= result.records <= 16
+    assert result.outside == 0
+    assert outlook.now_mm / 4.0 < result.worst_sigma_mm < 4.0 * outlook.now_mm
+
+
+def test_systematic_effects_widen_the_expanded_uncertainty(result):
+    plan = at_two_points(**SEED)
+    stated = plan.settings.model_copy(update={"uncertainty": UncertaintySettings(grade="ordinary")})
+    machine = replace(plan.robot, effects=stated_effects(stated))
+    wider = dry_run(replace(plan, settings=stated, robot=machine))
+    assert wider.records == result.records
+    assert wider.worst_sigma_mm == result.worst_sigma_mm < result.expanded_mm < wider.expanded_mm
+
+
+def test_minutes_are_of_everything_that_is_measured(result):
+    """Held-out poses are reached on straight lines."""
+    plan = at_two_points(**SEED)
+    timing, move_s = plan.settings.timing, usual_move_seconds(plan.settings)
+    poses = 3 * (6 + 1) + 3 * (6 + 5 + 1)
+    held_out = poses * (move_s + timing.window_s) / 60.0
+    noise = (
+        40 * 0.1 + (14 + 1 + 6) * move_s + (14 + 6) * 0.6
+    ) / 60.0  # to pilot poses, once beside, and back
+    records = plan.budget.time_model.minutes(result.records, 2)
+    assert result.minutes == pytest.approx(noise + records + held_out)
+
+
+def test_robots_that_cannot_be_measured_do_not_count():
+    plan = at_two_points(**SEED, tolerances__S_mm=200.0)
+    found = dry_run(plan)
+    assert found.robots == 0
+    assert found.drawn == 6
+    assert found.worst_sigma_mm is None
+
+
+def test_a_robot_calibrated_before_is_near_what_its_controller_has(make_plan, paper):
+    plan = make_plan()
+    controller = hexaglide_geometry(paper.actual["S"], paper.actual["B"], paper.actual["l"])
+    robot = make_robot(plan.settings, ControllerGeometry(controller, paper.branch))
+    centre = robot.belief().controller.vector
+    drawn = robots_within_tolerances(robot, 16, seed=3)
+    lengths = np.array([one.vector - centre for one in drawn])[:, -6:]
+    assert 0.5 < np.abs(lengths).max() <= 0.7

@@ -1,5 +1,6 @@
-"""A commit into a single file, and its rollback: what is written, kept and refused."""
+"""A commit into a file and its rollback, also with a fault at every call to the file system."""
 
+import math
 import os
 from pathlib import Path
 
@@ -9,11 +10,13 @@ from hexacell.config import write_back
 from hexacell.config import write_back as replacement
 from hexacell.config.change import ConfigChange, Receipt, propose
 from hexacell.config.layout import fingerprint
+from hexacell.config.pending_write import is_interrupted, note_write, settle_interrupted_write
 from hexacell.config.toml_format import NativeToml
 from hexacell.config.write_back import commit, rollback
 from hexacell.errors import FileError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
+from tests.hexacell.config.conftest import Bench, PowerCut
 from tests.native_config import NATIVE
 
 
@@ -137,3 +140,88 @@ def test_a_backup_that_does_not_read_back_stops_the_commit(
     with pytest.raises(FileError, match="backup is damaged"):
         commit(proposal, run)
     assert config.read_bytes() == proposal.text_before.encode()
+
+
+def test_any_single_failure_of_a_commit_leaves_the_old_config(either: Bench) -> None:
+    undone = 0
+    for name, _, raised in either.attempts(either.reset, either.commit):
+        assert either.found == (either.after if raised is None else either.before), name
+        settle_interrupted_write(either.files)  # a note may be left of what is undone
+        assert either.found == (either.after if raised is None else either.before), name
+        assert either.left_behind() == [], name
+        undone += isinstance(raised, WriteBackUndone)
+    assert undone >= 4 * len(either.files)  # the folder cannot be opened or synced; the file not be read
+
+
+@pytest.mark.sample("one-*", "two-inf")
+@pytest.mark.parametrize("width", [2, 5, math.inf])
+def test_consecutive_failures_leave_what_the_message_says_or_what_is_undone_next(
+    either: Bench, width: float
+) -> None:
+    kept, halves = ["config-before", "config-before-2"][: len(either.files)], 0
+    for name, run, raised in either.attempts(either.reset, either.commit, width=width):
+        if raised is None:
+            assert either.found == either.after, name
+        elif "may hold the new geometry" in str(raised):
+            halves += either.found != either.before
+            assert " and ".join(str(run / one) for one in kept) in str(raised), name
+        else:
+            assert either.found == either.before, name
+        settle_interrupted_write(either.files)
+        assert not either.is_mixed, name
+    assert halves or math.isfinite(width)
+
+
+@pytest.mark.sample("one-*", "two-commit")
+@pytest.mark.parametrize("job", ["commit", "rollback"])
+def test_a_power_cut_at_any_moment_is_settled(either: Bench, job: str) -> None:
+    doing, prepare = {
+        "commit": (either.commit, either.reset),
+        "rollback": (lambda run: rollback(Receipt.of(run)), either.commit_afresh),
+    }[job]
+    mixed, ends = 0, set()
+    for name, run, raised in either.attempts(prepare, doing, width=math.inf, error=PowerCut):
+        assert isinstance(raised, PowerCut), name
+        if was_mixed := either.is_mixed:
+            assert is_interrupted(either.files), name
+        settled = settle_interrupted_write(either.files)
+        assert not either.is_mixed, name
+        assert not is_interrupted(either.files), name
+        if was_mixed:
+            assert settled is not None, name
+            assert settled.endswith("between them: hexapod.hal got the old content back"), name
+        mixed += was_mixed
+        ends.add(either.found)
+        doing(run)  # whatever was left, it can be done again
+        assert either.found == (either.after if job == "commit" else either.before), name
+        rollback(Receipt.of(run))
+        assert either.found == either.before, name
+    assert ends == {either.before, either.after}
+    assert bool(mixed) is (len(either.files) > 1)
+
+
+@pytest.mark.sample("one-*")
+@pytest.mark.parametrize("width", [1, math.inf])
+def test_a_rollback_that_fails_leaves_one_of_both_and_can_be_repeated(either: Bench, width: float) -> None:
+    for name, run, raised in either.attempts(
+        either.commit_afresh, lambda run: rollback(Receipt.of(run)), width=width
+    ):
+        if len(either.files) == 1 and raised is not None and either.found == either.before:
+            assert "was replaced" in str(raised) or "cannot be read" in str(raised), name
+        settle_interrupted_write(either.files)
+        assert not either.is_mixed, name
+        rollback(Receipt.of(run))
+        assert either.found == either.before, name
+
+
+def test_what_is_settled_can_itself_be_cut_off(bench: Bench) -> None:
+    def half(run: object) -> None:
+        note_write(bench.files, bench.before, bench.after)
+        bench.files[0].write_bytes(bench.after[0])
+        bench.files[1].write_bytes(bench.before[1])
+
+    for name, _, _ in bench.attempts(
+        half, lambda _: settle_interrupted_write(bench.files), width=math.inf, error=PowerCut
+    ):
+        settle_interrupted_write(bench.files)
+        assert bench.found == bench.before, name

@@ -1,12 +1,26 @@
-"""Candidate orientations, and the commands that bring the controller to the intended joint variables."""
+"""Candidate orientations: what a record is worth, refinement, and sampled robots for the travel."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from hexacell.design.candidates import orientations, reachable, workspace_poses
+from hexacell.design import travel_monte_carlo
+from hexacell.design.candidate_refinement import QUICK, THOROUGH, CandidateSpace, RatedRecords, Rounds
+from hexacell.design.candidates import (
+    Amplitudes,
+    orientations,
+    reachable,
+    reachable_targets,
+    rows_apart,
+    workspace_poses,
+)
+from hexacell.design.criteria import D_OPTIMAL, Criterion, covariance_update
+from hexacell.design.predicted_records import SAFETY_SIGMAS, TRAVEL_SHARE, gauge_zero_at, predict_records
+from hexacell.design.travel_monte_carlo import TravelConstraint
 from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.pose import Pose, PoseBatch
 
@@ -113,3 +127,140 @@ def test_their_tilts_keep_a_smaller_limit(vague, paper):
 
 def test_those_out_of_reach_are_left_out(vague):
     assert len(workspace_poses(vague, np.array([[0.0, 2000.0, 500.0]]))) == 0
+
+
+def records(seed: int, count: int = 5, parameters: int = 7):
+    """A covariance, a weight, and Jacobians and covariances of some records."""
+    random = np.random.default_rng(seed)
+    roots = random.normal(size=(2, parameters, parameters))
+    noise_roots = random.normal(size=(count, 3, 3))
+    noise = noise_roots @ np.swapaxes(noise_roots, -1, -2) + 0.1 * np.eye(3)
+    return *(root @ root.T for root in roots), random.normal(size=(count, 3, parameters)), noise
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_weighted_gain_is_what_the_record_takes_off_the_weighted_variance(seed):
+    covariance, weight, jacobian, noise = records(seed)
+    gains = Criterion(weight).gain(covariance, jacobian, noise)
+    for gain, one, own in zip(gains, jacobian, noise, strict=True):
+        after = covariance_update(covariance, one, own)
+        assert gain == pytest.approx(np.trace(weight @ covariance) - np.trace(weight @ after), rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_gain_of_information_is_what_the_record_takes_off_the_volume(seed):
+    covariance, _, jacobian, noise = records(seed)
+    gains = D_OPTIMAL.gain(covariance, jacobian, noise)
+    for gain, one, own in zip(gains, jacobian, noise, strict=True):
+        after = covariance_update(covariance, one, own)
+        ratio = np.linalg.slogdet(covariance)[1] - np.linalg.slogdet(after)[1]
+        assert gain == pytest.approx(0.5 * ratio, rel=1e-9)
+
+
+FEW, MANY = 512, 16384
+SEEDS = range(3, 6)
+
+
+@pytest.fixture(scope="module", params=["little", "much"])
+def space(request, know) -> CandidateSpace:
+    """Of the first point, when little is known of the robot, and when much is."""
+    found = request.getfixturevalue(request.param)
+    belief = know(found)
+    return CandidateSpace(
+        belief,
+        gauge_zero_at(belief, found, 1),
+        lambda some: D_OPTIMAL.gain(belief.covariance, some.jacobian, some.covariance),
+    )
+
+
+def rated(space: CandidateSpace, count: int, seed: int = SEEDS[0]) -> RatedRecords:
+    turns = orientations(count, TILT, seed, Amplitudes.MOSTLY_LARGE)
+    found = space.rated(turns @ space.zero.orientation)
+    assert found is not None
+    return found
+
+
+@pytest.fixture(scope="module")
+def candidates(space) -> RatedRecords:
+    return rated(space, FEW)
+
+
+@pytest.fixture(scope="module", params=[QUICK, THOROUGH], ids=["quick", "thorough"])
+def rounds(request) -> Rounds:
+    found: Rounds = request.param
+    return found
+
+
+@pytest.fixture(scope="module")
+def refined(space, candidates, rounds) -> RatedRecords:
+    found: RatedRecords = space.refined(candidates, rounds)
+    return found
+
+
+def test_few_refined_ones_gain_more_than_the_best_of_thirty_times_as_many(space) -> None:
+    many, quick, thorough = (
+        np.mean([found.gains.max() for found in each])
+        for each in (
+            [rated(space, MANY, seed) for seed in SEEDS],
+            [space.refined(rated(space, FEW, seed), QUICK) for seed in SEEDS],
+            [space.refined(rated(space, FEW, seed), THOROUGH) for seed in SEEDS],
+        )
+    )
+    assert many < quick < thorough
+
+
+def test_all_candidates_stay_and_all_are_possible(space, candidates, refined) -> None:
+    assert set(candidates.gains.tolist()) <= set(refined.gains.tolist())
+    again = space.rated(refined.records.targets.poses.rotations)
+    assert again is not None
+    np.testing.assert_allclose(again.gains, refined.gains, rtol=1e-9)
+    used = np.abs(refined.records.deviation) + SAFETY_SIGMAS * refined.records.sigma
+    assert used.max() <= TRAVEL_SHARE * space.belief.limits.gauge_travel_mm
+
+
+@given(
+    angles=st.lists(st.floats(-3.0, 3.0), min_size=1, max_size=30),
+    most=st.integers(1, 12),
+    apart=st.floats(0.01, 1.0),
+)
+def test_orientations_apart(angles: list[float], most: int, apart: float) -> None:
+    """About one axis, where the angle between two is plain."""
+    turned = Rotation.from_rotvec(np.outer(angles, [0.0, 0.0, 1.0])).as_matrix()
+    rows = rows_apart(turned, np.arange(len(angles)), most, apart).tolist()
+    between = np.abs(np.subtract.outer(angles, angles))
+    between = np.minimum(between, 2.0 * np.pi - between)
+    assert rows[0] == 0
+    assert rows == sorted(set(rows))
+    assert len(rows) <= most
+    assert all(between[a, b] > apart - 1e-6 for a in rows for b in rows if a != b)
+    left_out = set(range(len(angles))) - set(rows)
+    if len(rows) < most:
+        assert all(min(between[row, kept] for kept in rows) <= apart + 1e-6 for row in left_out)
+
+
+@pytest.fixture(params=[2.0, 8.0])
+def asked(know, little, limits, request):
+    """The constraint after a few records, and candidates of which some keep it."""
+    belief = know(little, limits=replace(limits, gauge_travel_mm=request.param))
+    zero = gauge_zero_at(belief, little, 1)
+    turned = orientations(64, float(np.radians(30.0)), seed=4) @ zero.orientation
+    targets = reachable_targets(belief, PoseBatch.at(zero.reference, turned))
+    return TravelConstraint(belief, zero), predict_records(belief, zero, targets)
+
+
+def test_stages_exclude_what_all_samples_at_once_exclude(asked, monkeypatch):
+    constraint, records = asked
+    assert constraint.is_uncertain
+    in_stages = constraint.holds(records)
+    monkeypatch.setattr(travel_monte_carlo, "STAGES_UNCERTAIN", ())
+    np.testing.assert_array_equal(in_stages, constraint.holds(records))
+    assert in_stages.any()
+    assert not in_stages.all()
+
+
+def test_a_target_is_judged_alike_alone_and_among_others(asked):
+    constraint, records = asked
+    together = constraint.holds(records)
+    rows = np.append(np.flatnonzero(together)[:3], np.flatnonzero(~together)[:3])
+    for row in rows:
+        assert constraint.holds(records[np.array([row])])[0] == together[row]

@@ -1,9 +1,10 @@
-"""The test of single causes: as many false alarms as stated, and what it finds."""
+"""Single causes and located steps, against searches of all splits and least squares."""
 
 import numpy as np
 import pytest
+import ruptures
 
-from hexacell.drift.run_evidence import WhitenedRecords
+from hexacell.drift.run_evidence import CarriedPosterior, RunEvidence, WhitenedRecords, step_gains
 from hexacell.drift.single_cause import SingleCauseTest, single_cause_test
 from tests.hexacell.drift.synthetic_runs import CAUSES, LinearRobot
 
@@ -49,3 +50,55 @@ def test_correlated_scores_need_a_lower_limit_than_independent_ones() -> None:
     assert one == pytest.approx(2.576, abs=0.03)
     assert same == pytest.approx(one, abs=0.03)
     assert one < six < 3.2
+
+
+DIFFUSE = CarriedPosterior.diffuse(6, 0)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_time_is_that_of_least_squares(seed) -> None:
+    """One parameter, seen alike by every run: the likeliest step is the best split into two means."""
+    random = np.random.default_rng(seed)
+    values = random.standard_normal(40)
+    values[int(random.integers(5, 35)) :] += 1.0
+    runs = [RunEvidence(np.ones((1, 1)), np.array([value])) for value in values]
+    gains = step_gains(CarriedPosterior.diffuse(1, 0), runs, np.ones((1, 1)))
+    split, _ = ruptures.Dynp(model="l2", min_size=1, jump=1).fit(values).predict(n_bkps=1)
+    assert gains.likeliest == (split, 0)
+    before, after = values[:split], values[split:]
+    assert gains.changes[split, 0] == pytest.approx(after.mean() - before.mean(), rel=1e-3)
+    assert gains.sigmas[split, 0] == pytest.approx(np.sqrt(1 / len(before) + 1 / len(after)), rel=1e-3)
+
+
+def test_size_and_sigma_are_those_of_a_fit_with_the_step() -> None:
+    robot = LinearRobot(1)
+    runs = list(robot.runs(9))
+    robot.state[2] += 1.5
+    runs += robot.nights(7)
+    gains = step_gains(DIFFUSE, runs, CAUSES.by_state)
+    normal, weighted = np.zeros((7, 7)), np.zeros(7)
+    normal[:6, :6] += DIFFUSE.evidence.information
+    for place, run in enumerate(runs):
+        to_state = np.column_stack([np.eye(6), CAUSES.by_state[2] if place >= 10 else np.zeros(6)])
+        normal += to_state.T @ run.information @ to_state
+        weighted += to_state.T @ run.weighted
+    covariance = np.linalg.inv(normal)
+    assert gains.changes[10, 2] == pytest.approx((covariance @ weighted)[6], rel=1e-6)
+    assert gains.sigmas[10, 2] == pytest.approx(np.sqrt(covariance[6, 6]), rel=1e-6)
+
+
+def test_a_large_step_leaves_no_doubt_of_its_time() -> None:
+    robot = LinearRobot(2)
+    runs = list(robot.runs(9))
+    robot.state[4] += 8.0
+    runs += robot.nights(3)
+    gains = step_gains(DIFFUSE, runs, CAUSES.by_state)
+    assert gains.likeliest == (10, 4)
+    assert gains.likely_runs(4) == (10, 10)
+    assert gains.changes[10, 4] == pytest.approx(8.0, abs=4 * gains.sigmas[10, 4])
+
+
+def test_a_step_before_the_first_run_is_not_seen() -> None:
+    gains = step_gains(DIFFUSE, list(LinearRobot().runs(5)), CAUSES.by_state)
+    assert not gains.gains[0].any()
+    assert np.isinf(gains.sigmas[0]).all()

@@ -21,9 +21,9 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from hexacell.cell.fields import LONGEST_TEXT, Finite, Frozen, Text
-from hexacell.config.change import config_if_readable, numbers_of
 from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import ConfigLayout, fingerprint
+from hexacell.config.versions import config_if_readable, numbers_of
 from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.kinematics.parameters import ParameterUnit
 from hexacell.runs.cell_lock import user_name

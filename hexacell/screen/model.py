@@ -7,7 +7,7 @@ from operator import is_
 from typing import Any
 
 from hexacell.cell.loader import Cell, describe
-from hexacell.config.change import ConfigEditedSince
+from hexacell.config.versions import ConfigEditedSince
 from hexacell.errors import HexacellError, UsageError
 from hexacell.run_process.messages import LiveSnapshot
 from hexacell.run_process.recorded import RecordedRun

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hexacell.config.change import BEFORE, ConfigVersions, kept_paths
+from hexacell.config.change import BEFORE, kept_paths
 from hexacell.config.layout import names_of
+from hexacell.config.versions import ConfigVersions
 from hexacell.config.write_record import WriteKind, WriteRecord
 from hexacell.text.layout import wrapped
 

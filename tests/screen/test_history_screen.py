@@ -10,7 +10,7 @@ import pytest
 from textual.pilot import Pilot
 
 from hexacell.cell.loader import Cell
-from hexacell.config.change import ConfigEditedSince
+from hexacell.config.versions import ConfigEditedSince
 from hexacell.config.write_back import commit
 from hexacell.errors import FileError, UsageError
 from hexacell.run_process.messages import LiveSnapshot

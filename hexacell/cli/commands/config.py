@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.cli.terminal import TerminalOperator, is_interactive
-from hexacell.config.change import ConfigEditedSince
 from hexacell.config.pending_write import settle_config
+from hexacell.config.versions import ConfigEditedSince
 from hexacell.errors import ExitCode
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services.write_back.config_rollback import roll_back_config

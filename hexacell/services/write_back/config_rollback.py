@@ -5,16 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hexacell.cell.loader import Cell
-from hexacell.config.change import (
-    AFTER,
-    BEFORE,
-    ConfigEditedSince,
-    Receipt,
-    compare_versions,
-    diff_of_files,
-)
+from hexacell.config.change import AFTER, BEFORE, Receipt, diff_of_files
 from hexacell.config.layout import Contents, are_same_files, fingerprint_of, read_contents
 from hexacell.config.pending_write import held_config
+from hexacell.config.versions import ConfigEditedSince, compare_versions
 from hexacell.config.write_back import restore
 from hexacell.config.write_record import Recording, WriteCause, WriteKind, recorded_write, stated_reason
 from hexacell.errors import FileError, HexacellError, UsageError

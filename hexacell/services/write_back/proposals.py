@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import ClassVar
 
 from hexacell.cell.loader import load_cell
-from hexacell.config.change import ConfigChange, ConfigEditedSince, JsonRecord, compare_versions
+from hexacell.config.change import ConfigChange, JsonRecord
 from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import ConfigLayout, are_same_files, fingerprint
 from hexacell.config.pending_write import held_config
+from hexacell.config.versions import ConfigEditedSince, compare_versions
 from hexacell.config.write_back import commit
 from hexacell.config.write_record import WriteCause, WriteKind, recorded_write, stated_reason
 from hexacell.errors import FileError, LimitError, UsageError

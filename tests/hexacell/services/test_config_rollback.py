@@ -5,7 +5,8 @@ import os
 import pytest
 
 from hexacell.cell.loader import Cell
-from hexacell.config.change import AFTER, BEFORE, ConfigEditedSince
+from hexacell.config.change import AFTER, BEFORE
+from hexacell.config.versions import ConfigEditedSince
 from hexacell.config.write_back import commit
 from hexacell.errors import CellBusy, ExitCode, FileError, UsageError
 from hexacell.runs.cell_lock import cell_lock

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from hexacell.config.change import ConfigEditedSince, Receipt
+from hexacell.config.change import Receipt
+from hexacell.config.versions import ConfigEditedSince
 from hexacell.config.write_record import NumberChange
 from hexacell.errors import (
     AnswerNeeded,

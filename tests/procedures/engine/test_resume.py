@@ -69,7 +69,13 @@ def require_whole_sets(history: Sequence[events.Event]) -> None:
         taken = [sample.orientation for sample in measured.samples]
         assert sorted(taken) == list(range(1, len(taken) + 1))
     doubted: set[Any] = set()
+    arrived: tuple[int, ...] = ()
     for event in history:
+        if isinstance(event, events.RecordTaken):
+            assert len(arrived) == 6
+            assert event.record.directions == arrived
+        if isinstance(event, events.Arrived | events.Located | events.Interrupted):
+            arrived = getattr(event, "directions", ())
         match event:
             case events.Interrupted():
                 doubted = set(state.sets)

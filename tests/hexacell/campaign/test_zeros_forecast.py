@@ -45,7 +45,7 @@ def measured(base_mm: float) -> Measured:
     """With joints that are known as well as ``base_mm``."""
     cell = load_cell(CONFIGS / "gough-stewart.toml")
     tolerances = cell.settings.tolerances.model_copy(update={"base_mm": base_mm, "platform_mm": base_mm})
-    plan = cell.settings.identification.model_copy(update={"identify": ("zeros",), "orientations": 4})
+    plan = cell.settings.identification.model_copy(update={"identify": "zeros", "orientations": 4})
     settings: CellSettings = cell.settings.model_copy(
         update={"identification": plan, "tolerances": tolerances}
     )

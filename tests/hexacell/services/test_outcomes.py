@@ -75,9 +75,10 @@ async def test_what_rests_on_an_expired_certificate_needs_a_person(finished, mak
 def bend(site: Any, millimetres: float) -> None:
     """Somebody leans on the machine: its true geometry is another from now on."""
     physics = site.simulated.physics
-    bent = physics._truth.vector + millimetres * np.sin(np.arange(42.0))
+    machine = physics._machine
+    bent = machine._geometry.vector + millimetres * np.sin(np.arange(42.0))
     with physics._lock:
-        physics._truth = Geometry(HEXAGLIDE_PARAMETERS, bent)
+        machine._geometry = Geometry(HEXAGLIDE_PARAMETERS, bent)
         physics._joints = physics._joints + np.nan  # so that the platform is moved along at once
 
 

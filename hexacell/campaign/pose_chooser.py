@@ -132,8 +132,7 @@ class PoseChooser:
         self, limits: Limits, state: CampaignState, well_known: bool, most: float, tilt_share: float
     ) -> Array:
         """Candidates (n, 3, 3), relative to the platform's orientation at the reference."""
-        # The best are refined: more candidates are needed only where few of them are safe.
-        count = self.effort.candidates // (2 if well_known else 1)
+        count = self.effort.considered(len(state.measurements), is_well_known=well_known)
         amplitudes = Amplitudes.MOSTLY_LARGE if well_known else Amplitudes.ALL_SCALES
         tilt, turn = min(tilt_share * limits.tilt, most), min(limits.turn, most)
         # The seed differs for every record and every attempt, and is the same when they are repeated.

@@ -82,7 +82,8 @@ class Batch:
         return len(getattr(self, next(iter(self.__dataclass_fields__))))
 
     def __getitem__(self, rows: Index | tuple[Index | int, Index | int]) -> Self:
-        return type(self)(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+        # A list: poses are taken from batches so often that a generator takes a percent of a decision.
+        return type(self)(*[getattr(self, name)[rows] for name in self.__dataclass_fields__])
 
     @classmethod
     def joined(cls, parts: Iterable[Self]) -> Self:

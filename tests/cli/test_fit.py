@@ -64,7 +64,9 @@ def test_too_few_records_are_refused(typed_here, cell_folder, tmp_path, records)
 
 
 def test_a_mistake_in_the_file_is_named_with_its_line(typed_here, cell_folder, tmp_path, records):
-    rows = [*records[:4], f"{records[4].rpartition(',')[0]},abc", *records[5:]]
+    cells = records[4].split(",")
+    cells[records[0].split(",").index("dz")] = "abc"
+    rows = [*records[:4], ",".join(cells), *records[5:]]
     (tmp_path / "m.csv").write_text("".join(line + "\n" for line in rows))
     before = cell_folder.snapshot()
     outcome = fit(typed_here, cell_folder, "m.csv", "--json")
@@ -94,9 +96,10 @@ def test_deviations_in_another_unit_are_recognised(
     typed_here, cell_folder, tmp_path, records, factor, words
 ):
     rows = [line.split(",") for line in records]
+    columns = [rows[0].index(name) for name in ("dx", "dy", "dz")]
     for row in rows[1:]:
-        row[-3:] = [repr(factor * float(cell)) for cell in row[-3:]]
-    assert rows[0][-3:] == ["dx", "dy", "dz"]
+        for column in columns:
+            row[column] = repr(factor * float(row[column]))
     (tmp_path / "m.csv").write_text("\n".join(map(",".join, rows)))
     outcome = fit(typed_here, cell_folder)
     assert outcome.code == 1

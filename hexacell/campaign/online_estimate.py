@@ -3,8 +3,9 @@
 The estimate of n records is defined as the n-th of this chain, which begins at the drawing. Keeping the
 last one saves its computation and changes nothing: without it the chain is computed again.
 
-One more record changes the estimate little. If its cost is too large for the noise, some records may be
-false, or the solver is in a wrong minimum. Both are searched for: false records first, as soon as the
+One more record changes the estimate little. If its residuals are too large for the noise, the robot may
+have terms beside the geometry, which are chosen as in the end. If its cost is far too large, some records
+may be false, or the solver is in a wrong minimum. Both are searched for: false records first, as soon as the
 others would determine the parameters without them, then other minima, from the drawing and from random
 geometries within the tolerances. A search that explains nothing is remembered: the next one is made when
 there is more to explain or more to explain it by, twice the cost, or half as many records again.
@@ -20,11 +21,13 @@ from hexacell.campaign.pilots import are_counted
 from hexacell.design.predicted_records import GaugeZero, gauge_zero_at
 from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief
-from hexacell.identification.estimator import estimate_online, without_gross_errors
+from hexacell.identification.choice_of_terms import choose_terms
+from hexacell.identification.estimator import estimate_online, with_terms_of, without_gross_errors
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.fit import COARSE, INCREMENTAL
 from hexacell.identification.solver.multistart import restarts
 from hexacell.identification.solver.result import Identification
+from hexacell.identification.terms.term import ModelTerm
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.measurements.records import MeasurementSet, Record, RecordId
 from hexacell.robot.model import Robot
@@ -146,11 +149,15 @@ class ChainedEstimate:
     Attributes:
         false_records: those that were found false and are left out.
         in_vain: the last search, if it found no plausible estimate and this one is still implausible.
+        terms: those beside the geometry that the robot is taken to have.
+        terms_tried: of how many records they were chosen last.
     """
 
     identification: Identification
     false_records: frozenset[RecordId] = frozenset()
     in_vain: SearchInVain | None = None
+    terms: tuple[ModelTerm, ...] = ()
+    terms_tried: int = 0
 
 
 def update_estimate(
@@ -159,8 +166,39 @@ def update_estimate(
     """The estimate from that of all records but the last; with ``tries_others``, doubted if implausible."""
     if before is None:
         return ChainedEstimate(estimate_online(problem))
+    if before.terms:
+        problem = with_terms_of(problem, before.identification)
     kept = problem.subset(~problem.mask_of(before.false_records))
     found = _continued(kept, before.identification)
+    if _terms_are_due(found, before):
+        with_terms = _with_terms(problem, found)
+        if with_terms is not None:
+            return with_terms
+        before = replace(before, terms_tried=problem.records)
+    following = _following(problem, kept, found, before, tries_others=tries_others)
+    return replace(following, terms=before.terms, terms_tried=before.terms_tried)
+
+
+def _terms_are_due(found: Identification, before: ChainedEstimate) -> bool:
+    """Whether residuals that the noise does not explain are a reason to choose terms, or others."""
+    is_due = found.records >= RECORDS_FACTOR * before.terms_tried
+    return is_due and bool(found.problem.offered) and not found.noise_test.is_explained
+
+
+def _with_terms(problem: Problem, found: Identification) -> ChainedEstimate | None:
+    """The estimate with the terms that the records show; None if they show none."""
+    chosen = choose_terms(found).taken
+    if not chosen:
+        return None
+    nearly = estimate_online(problem.started_at(found.free).with_terms(chosen))
+    better = estimate_online(with_terms_of(problem, nearly))
+    return ChainedEstimate(better, terms=chosen, terms_tried=problem.records)
+
+
+def _following(
+    problem: Problem, kept: Problem, found: Identification, before: ChainedEstimate, *, tries_others: bool
+) -> ChainedEstimate:
+    """The estimate found from the ``kept`` records, or another one if that is implausible."""
     if not tries_others or _is_plausible(kept, found):
         return ChainedEstimate(found, before.false_records)
     if before.in_vain is not None and not before.in_vain.is_outdated(cost(found), problem.records):

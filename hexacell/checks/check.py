@@ -20,6 +20,7 @@ from hexacell.checks.drift_estimator import GUARDED_SCALE, DriftEstimator, Scale
 from hexacell.design.search_effort import USUAL_EFFORT, SearchEffort
 from hexacell.identification.problem.prior import IdentifiedBefore, drift_covariance, drift_sigma
 from hexacell.identification.solver.chi_square import ChiSquareVerdict
+from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
 from hexacell.lengths import unit_of
 from hexacell.measurements.records import MeasurementSet, Record, RecordId
@@ -190,12 +191,15 @@ def check_settings(settings: CellSettings, budget: int) -> CellSettings:
     return settings.model_copy(update={"identification": identification})
 
 
-def identified_before(robot: Robot, covariance: Array, drift_mm: float) -> IdentifiedBefore:
+def identified_before(
+    robot: Robot, covariance: Array, drift_mm: float, identified: Geometry | None = None
+) -> IdentifiedBefore:
     """The controller's geometry, as identified with a covariance (P, P), mm^2, of all parameters.
 
-    ``drift_mm`` is the standard deviation of what each length may have changed since.
+    ``drift_mm`` is the standard deviation of what each length may have changed since. Where the controller
+    got another geometry than was identified, that is given in the mechanism's frame convention.
     """
-    mechanism, geometry = robot.mechanism, robot.commanding
+    mechanism, geometry = robot.mechanism, robot.commanding if identified is None else identified
     rows = mechanism.convention.free_rows
     sigma = drift_sigma(mechanism, drift_mm, robot.tolerances)
     drift = drift_covariance(mechanism, geometry, sigma)

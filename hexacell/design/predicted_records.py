@@ -82,7 +82,8 @@ def estimate_gauge_zero(
         covariance = np.linalg.inv(weights.sum(axis=0))
     except np.linalg.LinAlgError:
         raise LimitError("the records of this point do not determine the ball's position") from None
-    reference = covariance @ np.einsum("nij,nj->i", weights, poses.positions - deviations)
+    zeros = poses.positions + belief.beside(poses, joints) - deviations
+    reference = covariance @ np.einsum("nij,nj->i", weights, zeros)
     mean_jacobian = covariance @ np.einsum("nij,njp->ip", weights, jacobian)
     return GaugeZero(reference, poses.rotations[0], joints[0], mean_jacobian, covariance)
 
@@ -170,5 +171,5 @@ def _predicted(
     sigma = belief.limits.sigma_along_gauges(as_known)
     by_chance = belief.noise.chance_covariance(by_joints) + zero.covariance
     chance = belief.limits.sigma_along_gauges(by_chance)
-    deviation = targets.poses.positions - zero.reference
+    deviation = targets.poses.positions + belief.beside(targets.poses, targets.joints) - zero.reference
     return PredictedRecords(targets, jacobian, covariance, deviation, sigma, chance)

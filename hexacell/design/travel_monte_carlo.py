@@ -241,7 +241,8 @@ class _Scenario:
         kept &= (leg_margins[first] >= 0.0).all(axis=-1)
 
         shape = len(errors), len(at)
-        positions = solved.poses.positions.reshape(*shape, 3)[kept]
+        beside = belief.beside(self.poses[at], self.joints[at])
+        positions = solved.poses.positions.reshape(*shape, 3)[kept] + beside
         return _SampledRobots(
             found=found.reshape(shape)[kept, 1:],
             deviations=positions[:, 1:] - positions[:, :1],

@@ -7,7 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
+from hexacell.identification.placement import Placement
 from hexacell.identification.problem.prior import Noise
+from hexacell.identification.solver.term_estimates import TermEstimates
 from hexacell.kinematics.commanded_motion import ActualPoses, CommandedRobot, RefusedCommands
 from hexacell.kinematics.corrections import NO_CORRECTIONS, Corrections
 from hexacell.kinematics.forward import apply_twist
@@ -40,6 +42,7 @@ class RobotBelief:
         covariance: of the free parameters (p, p), mm^2.
         work_frame_turns: axes (k, 3) about which a work frame can be taught.
         corrections: what the controller adds to its inverse kinematics for what is not geometry.
+        terms: what was identified of that; None for nothing.
     """
 
     mechanism: Mechanism
@@ -52,6 +55,20 @@ class RobotBelief:
     work_frame_turns: Array = field(default_factory=lambda: np.eye(3))
     refused: RefusedCommands = field(default_factory=RefusedCommands)
     corrections: Corrections = NO_CORRECTIONS
+    terms: TermEstimates | None = None
+
+    def beside(self, poses: PoseBatch, joints: Array) -> Array:
+        """Where the ball is beside n poses of the estimate by what is not geometry (n, 3), mm.
+
+        Without the terms that act by the direction of arrival.
+        """
+        moved, unknown = np.zeros((len(joints), 3)), np.zeros_like(joints)
+        if self.terms is None:
+            return moved
+        at = Placement(self.mechanism, self.estimate, poses, joints)
+        for term in self.terms.terms:
+            moved = moved + term.pose_errors(at, unknown)[:, :3] @ self.terms.of(term.name)[0]
+        return moved
 
     def zeroed_at(self, shown_mm: tuple[float, float, float] | None) -> RobotBelief:
         """This belief with gauges that were zeroed where they show ``shown_mm`` along base x, y, z."""

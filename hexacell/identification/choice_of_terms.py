@@ -142,6 +142,8 @@ class _Search:
         """Sum of the logarithms of the densities of each point's records, given all others."""
         model, points = self._model(terms), self.without.problem.labels[:, 0]
         everything = self._evidence(terms)
+        if self.without.problem.points < 2:
+            return everything
         others = (model.log_evidence(points != point, self.scale) for point in np.unique(points))
         return float(sum(everything - one for one in others))
 

@@ -77,7 +77,7 @@ def _without_faults(problem: Problem) -> tuple[Selection, tuple[TermFinding, ...
     Raises:
         UncorrectableFaultError: neither with terms nor without can the records be used.
     """
-    if not problem.offered:
+    if not problem.offered or problem.terms is not None:
         return select_faults(problem), ()
     first = fit_regularized(problem)
     chosen = choose_terms(first)
@@ -85,7 +85,7 @@ def _without_faults(problem: Problem) -> tuple[Selection, tuple[TermFinding, ...
         return select_faults(problem), chosen.findings
     nearly = fit_regularized(problem.started_at(first.free).with_terms(chosen.taken))
     # What the terms do is linearized once more, where they no longer bend the geometry.
-    with_terms = problem.started_at(nearly.free).with_terms(chosen.taken)
+    with_terms = with_terms_of(problem, nearly)
     if nearly.goodness.is_explained:
         return select_faults(with_terms), chosen.findings
     other, plain = _if_correctable(with_terms), _if_correctable(problem)
@@ -96,6 +96,12 @@ def _without_faults(problem: Problem) -> tuple[Selection, tuple[TermFinding, ...
         for one in chosen.findings
     )
     return plain or select_faults(problem), tuple(by_faults)
+
+
+def with_terms_of(problem: Problem, found: Identification) -> Problem:
+    """The problem of some records with the terms of an identification, linearized as these are there."""
+    assert found.terms is not None  # noqa: S101 - it was fitted with them
+    return problem.started_at(found.free).with_terms(found.terms.terms, found.terms.values)
 
 
 def _if_correctable(problem: Problem) -> Selection | None:

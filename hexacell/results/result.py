@@ -217,6 +217,9 @@ class AcceptedResult(Frozen):
         length: what the length check of its run found; None without one.
         leg_temperatures_c: mean temperature of each leg while the geometry was measured; None for
             a leg without a thermometer that answered.
+        identified: the geometry in the mechanism's frame convention, where the controller got another one;
+            None where it has this one.
+        terms: those beside the geometry that the robot has.
     """
 
     run: str
@@ -225,6 +228,8 @@ class AcceptedResult(Frozen):
     effects: dict[str, tuple[tuple[float, ...], ...]] = Field(default_factory=dict)
     length: LengthResult | None = None
     leg_temperatures_c: tuple[float | None, ...] = ()
+    identified: GeometryDocument | None = None
+    terms: tuple[TermResult, ...] = ()
 
     @property
     def parameter_columns(self) -> dict[str, Array]:

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import numpy as np
+
 from hexacell.cell.fields import Frozen
 from hexacell.cell.model import CellSettings
 from hexacell.identification.solver.result import Identification
 from hexacell.identification.terms.finding import Finding
+from hexacell.identification.terms.term import ModelTerm
 from hexacell.kinematics.corrections import NONE, Corrections, Six
+
+CHANGE = 0.1
+"""Share by which a coefficient may have changed since it was identified, one standard deviation."""
 
 Numbers = tuple[float, float, float, float, float, float]
 
@@ -61,6 +67,18 @@ def term_results(found: Identification) -> tuple[TermResult, ...]:
             result = result.model_copy(update=update)
         results.append(result)
     return tuple(results)
+
+
+def known_terms(offered: Iterable[ModelTerm], results: Iterable[TermResult]) -> tuple[ModelTerm, ...]:
+    """The terms of some results as they are known from these; they may have changed by a tenth."""
+    by_name = {term.name: term for term in offered}
+    return tuple(
+        by_name[one.name].identified_as(
+            np.array(one.values), np.hypot(one.sigma, CHANGE * np.abs(one.values))
+        )
+        for one in results
+        if one.values is not None and one.sigma is not None and one.name in by_name
+    )
 
 
 def _six(values: Iterable[float]) -> Six:

@@ -7,7 +7,9 @@ move least against that (:mod:`~hexacell.identification.diagnostics.frame_alignm
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.fields import Frozen
@@ -16,7 +18,11 @@ from hexacell.cell.model import CellSettings
 from hexacell.identification.diagnostics.frame_alignment import PoseErrors, choose_frames
 from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.rotations import Array
+from hexacell.results.absorbed_terms import absorbing
 from hexacell.robot.model import Robot
+
+NOTHING: Mapping[str, Array] = MappingProxyType({})
 
 
 class TaskDisplacement(Frozen):
@@ -59,13 +65,18 @@ class WrittenGeometry:
     displacement: TaskDisplacement | None
 
 
-def as_written(settings: CellSettings, robot: Robot, identified: Geometry) -> WrittenGeometry:
+def as_written(
+    settings: CellSettings, robot: Robot, identified: Geometry, left: Mapping[str, Array] = NOTHING
+) -> WrittenGeometry:
     """What the controller gets of an ``identified`` geometry in the mechanism's frame convention.
 
-    With zeros alone it keeps its frames: other ones would change all its numbers.
+    With zeros alone it keeps its frames: other ones would change all its numbers. What is ``left`` of terms
+    that it cannot correct, the geometry does as far as it can (:func:`.absorbing`).
     """
     if robot.identifies is not ParameterChoice.ALL:
         return WrittenGeometry(robot.for_controller(identified), None)
+    if left:
+        identified = absorbing(settings, robot, identified, left)
     task = Task.of(settings, robot, robot.belief())
     choice = choose_frames(
         robot.mechanism,

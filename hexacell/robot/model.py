@@ -66,6 +66,7 @@ class Robot:
         work_frame: the axes of the controller's base frame about which a work frame can be taught.
         effects: systematic ones, as they are stated of the machine.
         terms: of the model beside the geometry, which the machine may have.
+        known_terms: those that it has, as they were identified before; then no others are looked for.
         corrections: what its controller adds to the inverse kinematics for them.
         refused: commands that the cell file excludes, and those that the controller refused in this run.
         identifies: which parameters are identified.
@@ -88,6 +89,7 @@ class Robot:
     work_frame: str = "xyz"
     effects: tuple[Effect, ...] = ()
     terms: tuple[ModelTerm, ...] = ()
+    known_terms: tuple[ModelTerm, ...] = ()
     corrections: Corrections = NO_CORRECTIONS
     refused: RefusedCommands = field(default_factory=RefusedCommands)
     identifies: ParameterChoice = ParameterChoice.ALL
@@ -165,6 +167,7 @@ class Robot:
             unknowns=self.unknowns,
             travel_mm=self.limits.travels_mm,
             offered=self.terms if self.identifies is ParameterChoice.ALL else (),
+            known_terms=self.known_terms,
         )
         return assumptions.problem(measurements, before)
 
@@ -185,6 +188,7 @@ class Robot:
             self.frames.base[:, ["xyz".index(axis) for axis in self.work_frame]].T,
             self.refused,
             self.corrections,
+            None if identified is None else identified.terms,
         )
 
     def with_errors_of(self, settings: CellSettings) -> Robot:

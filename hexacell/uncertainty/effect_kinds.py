@@ -192,7 +192,8 @@ def _warmer(placement: Placement, um_per_m_k: Mapping[MachinePart, float]) -> Ar
     parameters = placement.mechanism.parameters
     coefficients = {kind.symbol: um_per_m_k[kind.part] if kind.part else 0.0 for kind in parameters.kinds}
     changes = parameters.by_kind(coefficients) * placement.geometry.vector
-    joints = um_per_m_k[MachinePart.BASE] * placement.joints
+    is_length = placement.mechanism.words.joint_unit is JointUnit.MM  # an angle does not expand
+    joints = um_per_m_k[MachinePart.BASE] * is_length * placement.joints
     moved = placement.by_parameters(changes[:, None]) + placement.by_joints(joints[..., None])
     return np.asarray(UM_PER_M * moved)
 

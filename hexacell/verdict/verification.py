@@ -192,8 +192,9 @@ def verified_accuracy(
         if length.replaces_stated:
             effects = robot.effects, robot.known_effects
             budget = task.budget(updated, belief, *effects, check.observation) or budget
-    # With zeros alone, what is written is not the estimate of all parameters.
-    written = found.free if robot.identifies is ParameterChoice.ALL else robot.free_parameters
+    # With zeros alone, or what is not geometry beside, what is written is not the estimate.
+    is_estimate = robot.identifies is ParameterChoice.ALL and found.terms is None
+    written = found.free if is_estimate else robot.free_parameters
     difference = written - updated.free
     errors = budget.errors_of(difference)
     of_geometry = budget.errors_of(difference, of_geometry=True) if budget.scatters else None

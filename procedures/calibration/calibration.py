@@ -25,6 +25,7 @@ from hexacell.design.search_effort import USUAL_EFFORT, SearchEffort
 from hexacell.errors import IdentifiabilityError
 from hexacell.identification.estimator import identify
 from hexacell.identification.identified_zeros import ParameterChoice
+from hexacell.identification.problem.prior import IdentifiedBefore
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.commanded_motion import RefusedCommands
 from hexacell.kinematics.geometry import Geometry
@@ -34,6 +35,7 @@ from hexacell.noise.allowances import Allowances
 from hexacell.noise.measured_noise import MeasuredNoise, with_measured_noise
 from hexacell.noise.repeats import Repeats
 from hexacell.results.result import AcceptedResult
+from hexacell.results.term_result import known_terms
 from hexacell.results.written_geometry import as_written
 from hexacell.robot.model import Robot, noise_of
 from hexacell.robot.stated import stated_effects
@@ -138,8 +140,21 @@ class Calibration:
     def robot_checked(self, robot: Robot) -> Robot:
         """A robot as the accepted result left it, with its drift since, before a length check."""
         assert self.accepted is not None  # noqa: S101 - without one no length check is begun
-        covariance, drift = np.array(self.accepted.covariance), self.settings.check.drift_per_parameter_mm
-        return replace(robot, known=identified_before(robot, covariance, drift).prior(1.0))
+        before = self.before(robot, self.settings)
+        robot = replace(robot, known_terms=known_terms(robot.terms, self.accepted.terms))
+        return replace(robot, known=None if before is None else before.prior(1.0))
+
+    def before(self, robot: Robot, settings: CellSettings) -> IdentifiedBefore | None:
+        """The geometry by the accepted result; None without one."""
+        if self.accepted is None:
+            return None
+        stated, parameters = self.accepted.identified, robot.mechanism.parameters
+        return identified_before(
+            robot,
+            np.array(self.accepted.covariance),
+            settings.check.drift_per_parameter_mm,
+            None if stated is None else Geometry.of(parameters, stated),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,10 +212,10 @@ class Knowledge:
     def check(self) -> Check:
         """The check of the robot as it is now."""
         calibration, wanted, accepted = self.calibration, self.settings.check, self.calibration.accepted
-        before, robot = None, self._at_temperatures(self.robot, self.settings)
+        robot = self._at_temperatures(self.robot, self.settings)
+        before = calibration.before(robot, self.settings)
         if accepted is not None:
-            covariance = np.array(accepted.covariance)
-            before = identified_before(robot, covariance, wanted.drift_per_parameter_mm)
+            robot = replace(robot, known_terms=known_terms(robot.terms, accepted.terms))
         return Check(
             self.settings,
             robot,

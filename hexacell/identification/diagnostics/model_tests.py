@@ -43,8 +43,10 @@ def update(found: Identification, further: Problem) -> Identification:
         IdentifiabilityError: no geometry fits any of the further records; they would prove nothing.
     """
     used = found.problem.starting_at(found.free, found.poses)
-    terms = () if found.problem.terms is None else found.problem.terms.terms
-    both = used.joined(further.started_at(found.free).with_terms(terms))
+    started = further.started_at(found.free)
+    if found.terms is not None:
+        started = started.with_terms(found.terms.terms, found.terms.values)
+    both = used.joined(started)
     kept, solution = solve_around_singularities(both, found.active_prior, FINE)
     if not np.isin(kept.labels[:, 0], further.labels[:, 0]).any():
         raise IdentifiabilityError(

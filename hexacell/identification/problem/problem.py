@@ -147,6 +147,11 @@ class Problem:
         readings = self.joints, self.deviations, self.gauges, self.directions
         return RecordPlacement(self.mechanism, geometry, poses, *readings)
 
+    def residuals(self, positions: Array) -> Array:
+        """Where the ball is with its terms, by positions (n, 3) without, less deviations; mm."""
+        without: Array = positions - self.deviations
+        return without if self.terms is None else without + self.terms.offset
+
     def solve_poses(self, free: Array) -> ForwardResult:
         """Poses that close the geometry of free parameters (p,), mm, at the records' joint variables."""
         return self.commands.solve_poses(self.geometry(free), self.joints)
@@ -192,12 +197,15 @@ class Problem:
         solved = self.solve_poses(free)
         return self.starting_at(free, solved.poses, solved.found)
 
-    def with_terms(self, terms: tuple[ModelTerm, ...]) -> Problem:
-        """The problem of a machine with some terms, as they act at the start poses."""
+    def with_terms(self, terms: tuple[ModelTerm, ...], values: Array | None = None) -> Problem:
+        """The problem of a machine with some terms, as they act at the start poses.
+
+        They are linearized at coefficients of some ``values`` (6 m,), which are known from a fit with them.
+        """
         if not terms:
             return replace(self, terms=None)
         records = self.measured_at(self.initial_parameters, self.start)
-        return replace(self, terms=TakenTerms.of(terms, records, self.has_start_pose))
+        return replace(self, terms=TakenTerms.of(terms, records, self.has_start_pose, values))
 
     def subset(self, rows: Mask) -> Problem:
         """The problem of some of the records (n,)."""
@@ -270,6 +278,7 @@ class Assumptions:
     unknowns: int = 0
     travel_mm: Deviation = NO_TRAVEL_MM
     offered: tuple[ModelTerm, ...] = ()
+    known_terms: tuple[ModelTerm, ...] = ()
 
     def problem(self, measurements: MeasurementSet, known: Problem | None = None) -> Problem:
         """The problem of a measurement set.
@@ -311,7 +320,7 @@ class Assumptions:
         else:
             start = commands.solve_poses(initial, joints)
         _require_start_poses(start.found, labels)
-        return Problem(
+        made = Problem(
             mechanism=mechanism,
             prior=self.prior,
             noise=self.noise.along(frames.base),
@@ -330,6 +339,7 @@ class Assumptions:
             travel_mm=self.travel_mm,
             offered=self.offered,
         )
+        return made.with_terms(self.known_terms) if self.known_terms else made
 
 
 def _interleaved(known: Values, rows: NDArray[np.intp], new: Values) -> Values:

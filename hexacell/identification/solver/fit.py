@@ -272,7 +272,7 @@ def _advance(now: _Iterate, options: SolverOptions) -> _Iterate | Termination:
         singular = missing if failures >= FAILURES_BEFORE_SINGULAR else now.singular
         return replace(now, failures=failures, missing=missing, singular=singular).damped()
     cost = now.cost(now.prediction.residuals, now.from_centre())
-    actual = cost - now.cost(trial.poses.positions - now.problem.deviations, now.from_centre(step))
+    actual = cost - now.cost(now.problem.residuals(trial.poses.positions), now.from_centre(step))
     if actual > 0.0:
         ratio = actual / predicted if predicted > 0.0 else 0.0
         return _accepted(now, step, trial.poses, ratio, options.relief)

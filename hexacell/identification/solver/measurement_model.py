@@ -77,7 +77,7 @@ def predict(problem: Problem, free: Array, poses: PoseBatch, mode: Array | None 
         free=free,
         geometry=geometry,
         poses=poses,
-        residuals=poses.positions - problem.deviations,
+        residuals=problem.residuals(poses.positions),
         weights=problem.noise.record_weights(by_joints),
         pose_jacobian=sensitivity.free,
         by_joints=by_joints,

@@ -8,7 +8,7 @@ import numpy as np
 
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.measurement_model import NuisanceElimination, Prediction
-from hexacell.identification.terms.taken import TakenTerms
+from hexacell.identification.terms.taken import TakenTerms, spread_of
 from hexacell.identification.terms.term import ModelTerm
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
@@ -48,10 +48,11 @@ class TermEstimates:
         by_parameters = elimination.common(prediction.jacobian)[-causes:]
         own = elimination.common_covariance[-causes:, -causes:]
         crossed = by_parameters @ covariance
-        spread = taken.spread
+        spread = spread_of(taken.terms)
+        mean = np.concatenate([term.mean for term in taken.terms])
         return cls(
             taken.terms,
-            spread @ values,
+            mean + spread @ values,
             spread @ (own + crossed @ by_parameters.T) @ spread.T,
             spread @ crossed,
         )

@@ -8,9 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexacell.identification.placement import RecordPlacement
-from hexacell.identification.terms.term import CAUSES, ModelTerm
+from hexacell.identification.terms.term import ModelTerm
+from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array, Mask
+
+SWEEPS = 4
+"""Forces by the pose, and the pose by forces, in turn."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -20,46 +24,80 @@ class TakenTerms:
     Attributes:
         columns: (n, 3, k), mm: where the ball is by one standard deviation of each independent part of the
             coefficients of all terms.
+        offset: (n, 3), mm: where it is by the coefficients that are expected.
     """
 
     terms: tuple[ModelTerm, ...]
     columns: Array
+    offset: Array
 
     @classmethod
-    def of(cls, terms: tuple[ModelTerm, ...], records: RecordPlacement, known: Mask) -> TakenTerms:
-        """The terms at records, whose poses are ``known`` (n,); at the others they do nothing."""
-        parts = [
-            term.pose_errors(records, records.directions)[:, :3] @ term.spread
-            if known.all()
-            else _at_some(term, records, known)
-            for term in terms
-        ]
-        return cls(terms, np.concatenate([np.zeros((len(records), 3, 0)), *parts], axis=-1))
+    def of(
+        cls,
+        terms: tuple[ModelTerm, ...],
+        records: RecordPlacement,
+        known: Mask,
+        values: Array | None = None,
+    ) -> TakenTerms:
+        """The terms at records, whose poses are ``known`` (n,); at the others they do nothing.
+
+        What they do is linearized at coefficients of some ``values`` (6 m,), by default at none.
+        """
+        some = replace(
+            records,
+            poses=records.poses[known],
+            joints=records.joints[known],
+            deviations=records.deviations[known],
+            directions=records.directions[known],
+        )
+        mean = np.concatenate([np.zeros(0), *(term.mean for term in terms)])
+        by_coefficients = np.zeros((len(records), 3, LEGS * len(terms)))
+        offset = np.zeros((len(records), 3))
+        if values is not None:
+            undeformed = some
+            some = deformed(terms, some, values)
+            offset[known] = some.poses.positions - undeformed.poses.positions
+            mean = mean - values
+        for row, term in enumerate(terms):
+            columns = slice(row * LEGS, (row + 1) * LEGS)
+            by_coefficients[known, :, columns] = term.pose_errors(some, some.directions)[:, :3]
+        return cls(terms, by_coefficients @ spread_of(terms), offset + by_coefficients @ mean)
 
     def __getitem__(self, rows: Mask | NDArray[np.intp]) -> TakenTerms:
-        return replace(self, columns=self.columns[rows])
+        return replace(self, columns=self.columns[rows], offset=self.offset[rows])
 
     def joined(self, other: TakenTerms) -> TakenTerms:
         """The same terms at both sets of records."""
-        return replace(self, columns=np.concatenate([self.columns, other.columns]))
-
-    @property
-    def spread(self) -> Array:
-        """(6 m, k) coefficients of all m terms by one standard deviation of each independent part."""
-        every = np.zeros((LEGS * len(self.terms), CAUSES * len(self.terms)))
-        for row, term in enumerate(self.terms):
-            every[row * LEGS : (row + 1) * LEGS, row * CAUSES : (row + 1) * CAUSES] = term.spread
-        return every
+        columns = np.concatenate([self.columns, other.columns])
+        return replace(self, columns=columns, offset=np.concatenate([self.offset, other.offset]))
 
 
-def _at_some(term: ModelTerm, records: RecordPlacement, known: Mask) -> Array:
-    columns = np.zeros((len(records), 3, CAUSES))
-    some = replace(
-        records,
-        poses=records.poses[known],
-        joints=records.joints[known],
-        deviations=records.deviations[known],
-        directions=records.directions[known],
-    )
-    columns[known] = term.pose_errors(some, some.directions)[:, :3] @ term.spread
-    return columns
+def deformed(terms: tuple[ModelTerm, ...], records: RecordPlacement, values: Array) -> RecordPlacement:
+    """Records where terms of some coefficients (6 m,) bring the platform, and joints that would do that.
+
+    Forces are those where it is then: a compliant leg yields a little more for what it has yielded. Where
+    no such pose is found it stays.
+    """
+    at = records
+    for _ in range(SWEEPS):
+        errors = np.zeros_like(records.joints)
+        for row, term in enumerate(terms):
+            coefficients = values[row * LEGS : (row + 1) * LEGS]
+            errors = errors + term.leg_errors(at, records.directions) * coefficients
+        joints = records.joints + errors / records.derivatives.joints
+        solved = forward_kinematics(records.mechanism, records.geometry, joints, records.poses)
+        kept = solved.found
+        poses = records.poses.with_rows(kept, solved.poses[kept])
+        at = replace(records, poses=poses, joints=np.where(kept[:, None], joints, records.joints))
+    return at
+
+
+def spread_of(terms: tuple[ModelTerm, ...]) -> Array:
+    """(6 m, k) coefficients of all m terms by one standard deviation of each independent part."""
+    parts = [term.spread for term in terms]
+    every = np.zeros((LEGS * len(parts), sum(part.shape[1] for part in parts)))
+    first = 0
+    for row, part in enumerate(parts):
+        every[row * LEGS : (row + 1) * LEGS, first : first + part.shape[1]] = part
+        first += part.shape[1]
+    return every

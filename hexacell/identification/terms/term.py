@@ -10,7 +10,7 @@ that is stated of the term.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -21,9 +21,6 @@ from hexacell.kinematics.rotations import Array
 LegErrors = Callable[[Placement, Array], Array]
 """Errors of the constraints (n, 6), mm, by one unit of each leg's own coefficient, at n poses at which the
 joints arrived from some directions (n, 6)."""
-
-CAUSES = 1 + LEGS
-"""Independent parts of six coefficients: the one that they share, and those of their own."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,6 +34,8 @@ class ModelTerm:
         leg_errors: what it does.
         takes_up: the effect of the uncertainty budget that it describes, by its name; empty for none.
         needs_directions: whether it acts by the side from which joints arrive.
+        mean: coefficients (6,) as they are expected.
+        sigma: one standard deviation of each (6,), where they were identified before; None: see ``size``.
     """
 
     name: str
@@ -45,6 +44,12 @@ class ModelTerm:
     leg_errors: LegErrors
     takes_up: str = ""
     needs_directions: bool = False
+    mean: Array = field(default_factory=lambda: np.zeros(LEGS))
+    sigma: Array | None = None
+
+    def identified_as(self, values: Array, sigma: Array) -> ModelTerm:
+        """The term with coefficients (6,) as they were identified, with what is not known of them."""
+        return replace(self, mean=values, sigma=sigma)
 
     def times(self, factor: float) -> ModelTerm:
         """The same term of another size."""
@@ -52,7 +57,9 @@ class ModelTerm:
 
     @property
     def spread(self) -> Array:
-        """(6, 7) coefficients by one standard deviation of each independent part."""
+        """(6, k) coefficients by one standard deviation of each independent part."""
+        if self.sigma is not None:
+            return np.diag(self.sigma)
         return self.size * np.concatenate([np.ones((LEGS, 1)), np.eye(LEGS)], axis=1)
 
     def pose_errors(self, placement: Placement, directions: Array) -> Array:

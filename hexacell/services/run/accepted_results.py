@@ -83,11 +83,14 @@ def _is_accepted(state: RunState, *, is_applied_later: bool) -> bool:
 
 
 def _result(cell: Cell, accepted: _AcceptedRun) -> AcceptedResult:
+    terms = tuple(one for one in accepted.identified.result.terms if one.is_taken)
     return AcceptedResult(
         run=str(accepted.path),
         at=accepted.at,
         covariance=accepted.identified.result.covariance,
         effects=_effects(cell, accepted.state),
+        identified=accepted.identified.result.geometry if terms else None,
+        terms=terms,
         length=_length(accepted.state),
         leg_temperatures_c=mean_leg_temperatures(
             cell.settings.thermometers,

@@ -10,7 +10,6 @@ from hexacell.identification.terms.backlash import backlash
 from hexacell.identification.terms.compliance import compliance
 from hexacell.identification.terms.play import play
 from hexacell.identification.terms.taken import TakenTerms
-from hexacell.identification.terms.term import CAUSES
 from hexacell.kinematics import rotations
 from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry
@@ -90,7 +89,7 @@ def test_coefficients_share_a_part_and_have_their_own(placement):
     assert term.spread @ term.spread.T == pytest.approx(0.01 * (np.ones((6, 6)) + np.eye(6)))
     known = np.arange(20) != 3
     taken = TakenTerms.of((term,), placement, known)
-    assert taken.columns.shape == (20, 3, CAUSES)
+    assert taken.columns.shape == (20, 3, 7)
     assert not taken.columns[3].any()
     whole = TakenTerms.of((term,), placement, np.ones(20, dtype=bool))
     np.testing.assert_allclose(taken.columns[known], whole.columns[known])

@@ -5,7 +5,7 @@ last one saves its computation and changes nothing: without it the chain is comp
 
 One more record changes the estimate little. If its residuals are too large for the noise, the robot may
 have terms beside the geometry, which are chosen as in the end. If its cost is far too large, some records
-may be false, or the solver is in a wrong minimum. Both are searched for: false records first, as soon as the
+false, or the solver is in a wrong minimum. Both are searched for: false records first, as soon as the
 others would determine the parameters without them, then other minima, from the drawing and from random
 geometries within the tolerances. A search that explains nothing is remembered: the next one is made when
 there is more to explain or more to explain it by, twice the cost, or half as many records again.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 import numpy as np
 
@@ -11,7 +11,10 @@ from hexacell.cell.model import CellSettings
 from hexacell.identification.solver.result import Identification
 from hexacell.identification.terms.finding import Finding
 from hexacell.identification.terms.term import ModelTerm
-from hexacell.kinematics.corrections import NONE, Corrections, Six
+from hexacell.kinematics.corrections import NO_CORRECTIONS, NONE, CorrectionKind, Corrections, Six
+from hexacell.kinematics.rotations import Array
+
+ANY_WEIGHT_N = 100.0
 
 CHANGE = 0.1
 """Share by which a coefficient may have changed since it was identified, one standard deviation."""
@@ -86,17 +89,38 @@ def _six(values: Iterable[float]) -> Six:
     return q1, q2, q3, q4, q5, q6
 
 
-def corrections_for(results: Iterable[TermResult], settings: CellSettings) -> Corrections:
-    """What a controller corrects of the terms that were taken; weight and centre are the cell file's."""
+def corrections_for(
+    results: Iterable[TermResult],
+    settings: CellSettings,
+    holds: Collection[str],
+    before: Corrections = NO_CORRECTIONS,
+) -> tuple[Corrections | None, dict[str, Array]]:
+    """What a controller is to correct of the terms that were taken, and the coefficients that are left.
+
+    Weight and centre are the cell file's. Of play only the sides matter on which the joints lie: they are
+    those of any weight.
+
+    Args:
+        results: of all terms.
+        settings: of the cell.
+        holds: the kinds of corrections that the controller's config has a place for.
+        before: what it corrects now, and goes on to of kinds that are not in the results.
+
+    Returns:
+        None for corrections that stay as they are.
+    """
     values = {result.name: result.values for result in results if result.values is not None}
-    if not values:
-        return Corrections()
+    able = [kind for kind in CorrectionKind if kind in values and kind in holds]
+    left = {name: np.array(value) for name, value in values.items() if name not in able}
+    if not able:
+        return None, left
     stated = settings.uncertainty
-    return Corrections(
+    wanted = Corrections(
         backlash=values.get("backlash", NONE),
         play_mm=values.get("play", NONE),
         compliance_um_n=values.get("compliance", NONE),
-        weight_n=stated.own_weight_n,
+        weight_n=stated.own_weight_n or ANY_WEIGHT_N,
         weight_direction=stated.own_weight_direction,
         weight_centre_mm=stated.own_weight_centre_mm,
     )
+    return before.taking(wanted, able), left

@@ -7,9 +7,8 @@ move least against that (:mod:`~hexacell.identification.diagnostics.frame_alignm
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
-from types import MappingProxyType
 
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.fields import Frozen
@@ -17,12 +16,11 @@ from hexacell.cell.measuring import AcceptanceSettings
 from hexacell.cell.model import CellSettings
 from hexacell.identification.diagnostics.frame_alignment import PoseErrors, choose_frames
 from hexacell.identification.identified_zeros import ParameterChoice
+from hexacell.kinematics.corrections import Corrections
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.rotations import Array
 from hexacell.results.absorbed_terms import absorbing
+from hexacell.results.term_result import TermResult, corrections_for
 from hexacell.robot.model import Robot
-
-NOTHING: Mapping[str, Array] = MappingProxyType({})
 
 
 class TaskDisplacement(Frozen):
@@ -58,23 +56,26 @@ class TaskDisplacement(Frozen):
 class WrittenGeometry:
     """A geometry in the frames in which a controller gets it.
 
-    ``displacement`` is None where no task pose shows it, or no frames were chosen.
+    ``displacement`` is None where no task pose shows it, or no frames were chosen; ``corrections`` are None
+    where they stay as they are.
     """
 
     geometry: Geometry
     displacement: TaskDisplacement | None
+    corrections: Corrections | None = None
 
 
 def as_written(
-    settings: CellSettings, robot: Robot, identified: Geometry, left: Mapping[str, Array] = NOTHING
+    settings: CellSettings, robot: Robot, identified: Geometry, terms: Iterable[TermResult] = ()
 ) -> WrittenGeometry:
     """What the controller gets of an ``identified`` geometry in the mechanism's frame convention.
 
-    With zeros alone it keeps its frames: other ones would change all its numbers. What is ``left`` of terms
-    that it cannot correct, the geometry does as far as it can (:func:`.absorbing`).
+    With zeros alone it keeps its frames: other ones would change all its numbers. What of the ``terms`` it
+    cannot correct, the geometry does as far as it can (:func:`.absorbing`).
     """
     if robot.identifies is not ParameterChoice.ALL:
         return WrittenGeometry(robot.for_controller(identified), None)
+    corrections, left = corrections_for(terms, settings, robot.holds, robot.corrections)
     if left:
         identified = absorbing(settings, robot, identified, left)
     task = Task.of(settings, robot, robot.belief())
@@ -85,4 +86,5 @@ def as_written(
         new=identified,
         poses=robot.frames.inverse().poses(task.poses),
     )
-    return WrittenGeometry(choice.geometry, TaskDisplacement.of(choice.displacement, settings.acceptance))
+    moved = TaskDisplacement.of(choice.displacement, settings.acceptance)
+    return WrittenGeometry(choice.geometry, moved, corrections)

@@ -31,7 +31,7 @@ from hexacell.identification.problem.problem import Assumptions, Problem
 from hexacell.identification.solver.result import GeometryEstimate, Identification
 from hexacell.identification.terms.term import ModelTerm
 from hexacell.kinematics.commanded_motion import CommandedRobot, RefusedCommands
-from hexacell.kinematics.corrections import NO_CORRECTIONS, Corrections
+from hexacell.kinematics.corrections import NO_CORRECTIONS, CorrectionKind, Corrections
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism, joint_zeros
 from hexacell.kinematics.parameters import ParameterSet
@@ -67,7 +67,8 @@ class Robot:
         effects: systematic ones, as they are stated of the machine.
         terms: of the model beside the geometry, which the machine may have.
         known_terms: those that it has, as they were identified before; then no others are looked for.
-        corrections: what its controller adds to the inverse kinematics for them.
+        corrections: what its controller adds to the inverse kinematics for them; ``holds`` are the kinds of
+            these that its config has a place for.
         refused: commands that the cell file excludes, and those that the controller refused in this run.
         identifies: which parameters are identified.
     """
@@ -91,6 +92,7 @@ class Robot:
     terms: tuple[ModelTerm, ...] = ()
     known_terms: tuple[ModelTerm, ...] = ()
     corrections: Corrections = NO_CORRECTIONS
+    holds: frozenset[CorrectionKind] = frozenset()
     refused: RefusedCommands = field(default_factory=RefusedCommands)
     identifies: ParameterChoice = ParameterChoice.ALL
 
@@ -200,8 +202,11 @@ class Robot:
         """A geometry in the convention's frames, in the frames of the controller's config."""
         return self.mechanism.change_frames(geometry, self.frames.inverse())
 
-    def with_controller(self, written: Geometry) -> Robot:
-        """The robot once its controller has a ``written`` geometry, in frames of that geometry's own."""
+    def with_controller(self, written: Geometry, corrections: Corrections | None = None) -> Robot:
+        """The robot once its controller has a ``written`` geometry, in frames of that geometry's own.
+
+        Without ``corrections`` the controller keeps those that it has.
+        """
         own = self._commanding_as_written.geometry
         before = (CommandingGeometry(one, self.frames) for one in (own, *self.provisional))
         frames = self.mechanism.normalize_frames(written)[1]
@@ -212,6 +217,7 @@ class Robot:
             limits=replace(self.limits_with(written), frames=frames),
             provisional=(),
             uses_provisional=False,
+            corrections=self.corrections if corrections is None else corrections,
             earlier=(*before, *self.earlier),
         )
 
@@ -339,6 +345,7 @@ def make_robot(
         effects=stated_effects(settings),
         terms=stated_terms(settings),
         corrections=controller.corrections,
+        holds=controller.holds,
         refused=settings.excluded_commands,
         identifies=(ParameterChoice.ZEROS if settings.identification.only_zeros else ParameterChoice.ALL),
     )

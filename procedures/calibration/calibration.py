@@ -28,6 +28,7 @@ from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.identification.problem.prior import IdentifiedBefore
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.commanded_motion import RefusedCommands
+from hexacell.kinematics.corrections import Corrections
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
@@ -35,7 +36,7 @@ from hexacell.noise.allowances import Allowances
 from hexacell.noise.measured_noise import MeasuredNoise, with_measured_noise
 from hexacell.noise.repeats import Repeats
 from hexacell.results.result import AcceptedResult
-from hexacell.results.term_result import known_terms
+from hexacell.results.term_result import known_terms, term_results
 from hexacell.results.written_geometry import as_written
 from hexacell.robot.model import Robot, noise_of
 from hexacell.robot.stated import stated_effects
@@ -65,8 +66,8 @@ class Learnt:
         noise: what was measured of it; None before that, or where the cell file does not ask for it.
         provisional: parameters of the geometry that the controller was given for a while, in the
             mechanism's frame convention; ``is_lent``: it has it now.
-        written: parameters of the proposed geometry, in the controller's frames; ``is_committed``: the
-            controller has it.
+        written: parameters of the proposed geometry, in the controller's frames, with the ``corrections``
+            that are proposed beside it; ``is_committed``: the controller has it.
     """
 
     refused: RefusedCommands
@@ -74,6 +75,7 @@ class Learnt:
     provisional: tuple[float, ...] | None = None
     is_lent: bool = False
     written: tuple[float, ...] | None = None
+    corrections: Corrections | None = None
     is_committed: bool = False
 
 
@@ -112,6 +114,7 @@ class Calibration:
                 None if lent is None else tuple(lent.vector.tolist()),
                 state.provisional_active,
                 None if written is None else tuple(written.vector.tolist()),
+                None if proposed is None else proposed.corrections,
                 state.committed is not None,
             )
         )
@@ -201,7 +204,7 @@ class Knowledge:
         """The plan for the geometry that the controller has now, and for those that it had."""
         if not self.learnt.is_committed:
             return self.identifying
-        return self._plan_of(self.robot.with_controller(self._written))
+        return self._plan_of(self.robot.with_controller(self._written, self.learnt.corrections))
 
     @cached_property
     def allowances(self) -> Allowances:
@@ -248,7 +251,7 @@ class Knowledge:
 
     def written_robot(self, state: RunState) -> Robot:
         """The robot with the proposed geometry in its controller."""
-        return self._measured(self.robot.with_controller(self._written), state)
+        return self._measured(self.robot.with_controller(self._written, self.learnt.corrections), state)
 
     def _measured(self, robot: Robot, state: RunState) -> Robot:
         """The robot with the noise that all repeats show, by the geometry that the records show.
@@ -293,8 +296,10 @@ class Knowledge:
     def held_out_poses_after(self, identified: Identification, before: PosesByPoint) -> PosesByPoint:
         """Held-out poses that the robot can take once the identified geometry is written."""
         zeros = self.robot.identified_zeros(identified)
-        written = as_written(self.settings, self.robot, (zeros or identified).geometry).geometry
-        return self._held_out_poses(self.robot.with_controller(written)).after(identified, before)
+        geometry, terms = (zeros or identified).geometry, term_results(identified)
+        written = as_written(self.settings, self.robot, geometry, terms)
+        after = self.robot.with_controller(written.geometry, written.corrections)
+        return self._held_out_poses(after).after(identified, before)
 
     def confirming_poses(self, identified: Identification, state: RunState) -> PosesByPoint:
         """Held-out poses unlike all that were measured, to confirm a failure."""

@@ -3,8 +3,6 @@
 from dataclasses import replace
 from typing import ClassVar, Literal
 
-import numpy as np
-
 from hexacell.cell.fields import GeometryDocument
 from hexacell.kinematics.corrections import Corrections
 from hexacell.results.written_geometry import TaskDisplacement, as_written
@@ -53,9 +51,8 @@ class Propose(Computation):
             largest_change_mm=settings.acceptance.largest_change_mm,
             expired=started.expired if settings.certificates and started is not None else None,
         )
-        left = {one.name: np.array(one.values) for one in result.terms if one.is_taken}
-        written = as_written(settings, robot, identified.geometry, left)
-        change = run.config.change_to(written.geometry, state)
+        written = as_written(settings, robot, identified.geometry, result.terms)
+        change = run.config.change_to(written.geometry, state, written.corrections)
         change.save(run.folder.proposal, like=run.cell.config_path)
         return Proposed(
             gates=conditions,

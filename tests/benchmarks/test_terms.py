@@ -19,6 +19,7 @@ from hexacell.identification.solver.result import Identification
 from hexacell.identification.terms.backlash import backlash
 from hexacell.identification.terms.compliance import compliance
 from hexacell.identification.terms.play import play
+from hexacell.kinematics.corrections import NO_CORRECTIONS, CorrectionKind
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.results.term_result import corrections_for, term_results
@@ -114,8 +115,8 @@ def carried_out(machine: Machine, number: int) -> Outcome:
     try:
         found = identify(robot.problem(world.records(own.commands, robot.commanding)))
         written = robot.with_controller(robot.for_controller(found.geometry))
-        corrections = corrections_for(term_results(found), own.cell.settings)
-        after = replace(written, corrections=corrections)
+        corrections, _ = corrections_for(term_results(found), own.cell.settings, list(CorrectionKind))
+        after = replace(written, corrections=corrections or NO_CORRECTIONS)
         corrected = replace(world, robot=after, sent_further=partial(sent_further, after, found))
         hour = world.hours(own.commands, robot.commanding)
         records = records_after(corrected, found, own.held_out, hour, HELD_OUT_FROM)

@@ -105,9 +105,10 @@ class SimulatedMachine:
             return self.start if self.fails_forward else self._pose_now().pose(0)
 
     def joints(self) -> tuple[float, ...]:
-        """The joints (6,), mm, that the controller reports: as commanded."""
+        """The joints (6,), mm, that the controller reports: as it commands, without backlash."""
         with self._lock:
-            joints = self._joints(self._pose_now())[0]
+            pose = self._pose_now()
+            joints = with_longer_legs(self.mechanism, self._geometry, pose, self._joints(pose))[0]
             if self.includes_zeros:
                 joints = joints + joint_zeros(self.mechanism, self._geometry.geometry)
             return tuple(float(value) for value in joints)

@@ -27,14 +27,19 @@ from drivers.errors import NotHomedError
 from drivers.interfaces import EncoderSample
 from hexacell.cell.model import CellSettings
 from hexacell.clock import CellClock
+from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import CurrentConfig
-from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Branch, Mechanism, joint_zeros
+from hexacell.identification.placement import Placement
+from hexacell.identification.terms.corrected_joints import added_to_joints
+from hexacell.kinematics.mechanism import Mechanism, joint_zeros
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from procedures.devices.device_set import Devices
 from procedures.guards.polling import POLL_PAUSE_S
 from procedures.run.trips import Guard, Trip
+
+NOT_KNOWN = 0.2
+"""Share of what the controller adds to its joints that may differ: it computes forces in its own way."""
 
 ATTEMPTS = 5
 """Reports are read one after the other, and are read again if a joint moved a little in between."""
@@ -85,19 +90,18 @@ class PositionMismatch:
 
 def position_mismatch(
     mechanism: Mechanism,
-    geometry: Geometry,
-    branch: Branch,
+    config: ControllerGeometry,
     reports: PositionReports,
     *,
     position_mm: float,
     following: float,
 ) -> PositionMismatch | None:
-    """How reports disagree under the controller's geometry, at the leg where most; None if they agree.
+    """How reports disagree under the controller's config, at the leg where most; None if they agree.
 
     They agree if a reported position is off by at most ``position_mm``, and an encoder from its joint by at
     most ``following``, mm.
     """
-    by_pose, rounding = _joints_of(mechanism, geometry, branch, reports.pose, position_mm)
+    by_pose, rounding = _joints_of(mechanism, config, reports.pose, position_mm)
     from_encoders = _excess(by_pose - reports.encoders, rounding + following)
     odd: PositionSource | None = None
     excess = from_encoders
@@ -124,15 +128,19 @@ def position_mismatch(
 
 
 def _joints_of(
-    mechanism: Mechanism, geometry: Geometry, branch: Branch, pose: Pose, position_mm: float
+    mechanism: Mechanism, config: ControllerGeometry, pose: Pose, position_mm: float
 ) -> tuple[Array, Array]:
     """Joint variables (6,), mm, of a pose, NaN if it is out of reach; what its tolerance does to them."""
     poses = PoseBatch.of([pose])
-    joints = mechanism.inverse(geometry, branch, poses)
-    derivatives = mechanism.derivatives(geometry, poses, np.nan_to_num(joints))
+    joints = mechanism.inverse(config.geometry, config.branch, poses)
+    at = Placement(mechanism, config.geometry, poses, np.nan_to_num(joints))
+    derivatives, added = at.derivatives, np.zeros(6)
+    if not config.corrections.are_none:
+        added = added_to_joints(at, config.corrections)[0]
     with np.errstate(divide="ignore", invalid="ignore"):
         slopes = np.linalg.norm(derivatives.pose[0, :, :3], axis=-1) / np.abs(derivatives.joints[0])
-    return joints[0], position_mm * np.maximum(1.0, np.nan_to_num(slopes, nan=1.0, posinf=1.0))
+    rounding = position_mm * np.maximum(1.0, np.nan_to_num(slopes, nan=1.0, posinf=1.0))
+    return joints[0] + added, rounding + NOT_KNOWN * np.abs(added)
 
 
 def _excess(differences: Array, tolerances: Array) -> Array:
@@ -198,8 +206,7 @@ class PositionCheck:
         reports = PositionReports(reported.pose, joints, np.array(encoders.positions))
         mismatch = position_mismatch(
             mechanism,
-            commanding.geometry,
-            commanding.branch,
+            commanding,
             reports,
             position_mm=self.settings.controller.position_tolerance_mm,
             following=following,

@@ -9,6 +9,7 @@ import pytest
 from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
+from hexacell.config.interface import ControllerGeometry
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
@@ -42,7 +43,9 @@ def rounded(pose: Pose) -> Pose:
 
 
 def mismatch(reports: PositionReports, geometry: Geometry | None = None) -> PositionMismatch | None:
-    return position_mismatch(Hexaglide(), geometry or ROBOT.controller, ROBOT.branch, reports, **TOLERANCES)
+    return position_mismatch(
+        Hexaglide(), ControllerGeometry(geometry or ROBOT.controller, ROBOT.branch), reports, **TOLERANCES
+    )
 
 
 def reports(**changes: Any) -> PositionReports:
@@ -96,7 +99,9 @@ def test_a_geometry_that_differs_by_a_twentieth_is_odd_although_the_encoders_agr
 
 def test_another_branch_is_another_geometry() -> None:
     branch: Any = tuple(-side for side in ROBOT.branch)
-    found = position_mismatch(Hexaglide(), ROBOT.controller, branch, reports(), **TOLERANCES)
+    found = position_mismatch(
+        Hexaglide(), ControllerGeometry(ROBOT.controller, branch), reports(), **TOLERANCES
+    )
     assert found is not None
     assert found.odd is PositionSource.POSE
 

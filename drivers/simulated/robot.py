@@ -6,15 +6,21 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.simulated.corrected_joints import directions_on, with_half_backlash, with_longer_legs
+from drivers.simulated.corrected_joints import (
+    ROUNDS,
+    directions_on,
+    with_half_backlash,
+    with_longer_legs,
+)
 from drivers.simulated.linuxcnc.state import MotionRefused
 from drivers.simulated.physics import RobotPhysics
 from hexacell.cell.simulation import SoftLimits
 from hexacell.clock import CellClock
+from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import ConfigLayout
 from hexacell.errors import FileError
 from hexacell.kinematics import rotations
-from hexacell.kinematics.forward import continue_solution
+from hexacell.kinematics.forward import ForwardResult, continue_solution
 from hexacell.kinematics.mechanism import Mechanism, joint_zeros
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -33,9 +39,9 @@ MOST_STEPS = 1024
 class SimulatedMachine:
     """The machine behind a controller that reads its geometry whenever it is switched on.
 
-    With corrections in its config it sends the joints elsewhere than it reports: pose and joints that it
-    reports are those commanded. Corrections that it reads take effect with the next motion, and backlash
-    with the first motion of a joint.
+    With corrections in its config the joints that it commands and reports are those of legs as long as they
+    are then; backlash is added to what it sends, and not reported. It takes effect with the first motion of
+    a joint.
 
     Attributes:
         config: the file, or the files, with its geometry, in ``layout``.
@@ -123,11 +129,9 @@ class SimulatedMachine:
             return
         with self._lock:
             here = self._pose_now()
-            joints = self._joints(here)
+            joints = with_longer_legs(self.mechanism, self._geometry, here, self._joints(here))
             new = self.layout.read(*self.config)
-            found = continue_solution(
-                self.mechanism, new.geometry, joints, start=here, start_geometry=self._geometry.geometry
-            )
+            found = self._pose_at(new, joints, here)
             if not found.found[0]:
                 raise FileError(
                     "this geometry has no pose at the present joint variables", subject=self.config[0]
@@ -138,6 +142,21 @@ class SimulatedMachine:
 
     def home(self) -> None:
         """The encoders are absolute: nothing to do."""
+
+    def _pose_at(self, new: ControllerGeometry, joints: Array, here: PoseBatch) -> ForwardResult:
+        """The pose that a controller with another config commands by the joints (1, 6) that it reports."""
+        found = continue_solution(
+            self.mechanism, new.geometry, joints, start=here, start_geometry=self._geometry.geometry
+        )
+        for _ in range(0 if new.corrections.are_none else ROUNDS):
+            if not found.found[0]:
+                break
+            own = self.mechanism.inverse(new.geometry, new.branch, found.poses)
+            added = with_longer_legs(self.mechanism, new, found.poses, own) - own
+            found = continue_solution(
+                self.mechanism, new.geometry, joints - added, start=found.poses, start_geometry=new.geometry
+            )
+        return found
 
     def _place(self) -> tuple[int, float]:
         """The row of the line that the present progress of the joints is behind, and how far."""

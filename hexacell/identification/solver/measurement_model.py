@@ -78,12 +78,22 @@ def predict(problem: Problem, free: Array, poses: PoseBatch, mode: Array | None 
         geometry=geometry,
         poses=poses,
         residuals=problem.residuals(poses.positions),
-        weights=problem.noise.record_weights(by_joints),
+        weights=_weights(problem, by_joints),
         pose_jacobian=sensitivity.free,
         by_joints=by_joints,
         mode=sensitivity.mode if mode is None else mode,
         singular=is_singular(by_joints),
     )
+
+
+def _weights(problem: Problem, by_joints: Array) -> Array:
+    """Inverse covariances (n, 3, 3), 1/mm^2, of records by ``dP/dq`` (n, 3, 6)."""
+    terms = problem.terms
+    if terms is None or not terms.unknown.any():
+        return problem.noise.record_weights(by_joints)
+    covariance = problem.noise.record_covariance(by_joints)
+    on_either_side = (by_joints * terms.unknown[:, None, :]) @ np.swapaxes(by_joints, -1, -2)
+    return np.asarray(np.linalg.inv(covariance + on_either_side))
 
 
 def evaluate_step(

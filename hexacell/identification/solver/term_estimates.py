@@ -57,12 +57,13 @@ class TermEstimates:
             spread @ crossed,
         )
 
-    def joints_stand(self, joints: Array, directions: Array) -> Array:
-        """Where joints (6,) stand, by what encoders show and from which side they came; in their unit."""
+    def beside_encoders(self, directions: Array) -> Array:
+        """How far joints (6,) stand from where encoders show them, by the side from which they came."""
+        beside = np.zeros(LEGS)
         for term in self.terms:
             if term.needs_directions:
-                joints = joints - 0.5 * self.of(term.name)[0] * directions
-        return joints
+                beside = beside - 0.5 * self.of(term.name)[0] * directions
+        return beside
 
     def of(self, name: str) -> tuple[Array, Array]:
         """Coefficients (6,) of one term, and one standard deviation (6,) of each."""

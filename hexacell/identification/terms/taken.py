@@ -25,11 +25,13 @@ class TakenTerms:
         columns: (n, 3, k), mm: where the ball is by one standard deviation of each independent part of the
             coefficients of all terms.
         offset: (n, 3), mm: where it is by the coefficients that are expected.
+        unknown: (n, 6) variance of where joints are of which nobody knows from which side they came.
     """
 
     terms: tuple[ModelTerm, ...]
     columns: Array
     offset: Array
+    unknown: Array
 
     @classmethod
     def of(
@@ -61,15 +63,28 @@ class TakenTerms:
         for row, term in enumerate(terms):
             columns = slice(row * LEGS, (row + 1) * LEGS)
             by_coefficients[known, :, columns] = term.pose_errors(some, some.directions)[:, :3]
-        return cls(terms, by_coefficients @ spread_of(terms), offset + by_coefficients @ mean)
+        unknown = _unknown_places(terms, records.directions, values)
+        return cls(terms, by_coefficients @ spread_of(terms), offset + by_coefficients @ mean, unknown)
 
     def __getitem__(self, rows: Mask | NDArray[np.intp]) -> TakenTerms:
-        return replace(self, columns=self.columns[rows], offset=self.offset[rows])
+        parts = self.columns[rows], self.offset[rows], self.unknown[rows]
+        return TakenTerms(self.terms, *parts)
 
     def joined(self, other: TakenTerms) -> TakenTerms:
         """The same terms at both sets of records."""
-        columns = np.concatenate([self.columns, other.columns])
-        return replace(self, columns=columns, offset=np.concatenate([self.offset, other.offset]))
+        mine = self.columns, self.offset, self.unknown
+        others = other.columns, other.offset, other.unknown
+        return TakenTerms(self.terms, *map(np.concatenate, zip(mine, others, strict=True)))
+
+
+def _unknown_places(terms: tuple[ModelTerm, ...], directions: Array, values: Array | None) -> Array:
+    """Variance (n, 6) of joints that may be on either side, by coefficients of some values (6 m,)."""
+    variance = np.zeros_like(directions)
+    for row, term in enumerate(terms):
+        if term.needs_directions:
+            size = term.mean if values is None else values[row * LEGS : (row + 1) * LEGS]
+            variance = variance + np.where(directions == 0.0, (0.5 * size) ** 2, 0.0)
+    return variance
 
 
 def deformed(terms: tuple[ModelTerm, ...], records: RecordPlacement, values: Array) -> RecordPlacement:

@@ -6,12 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.simulated.corrected_joints import (
-    ROUNDS,
-    directions_on,
-    with_half_backlash,
-    with_longer_legs,
-)
+from drivers.simulated.corrected_joints import ROUNDS, directions_on, with_half_backlash, with_longer_legs
 from drivers.simulated.linuxcnc.state import MotionRefused
 from drivers.simulated.physics import RobotPhysics
 from hexacell.cell.simulation import SoftLimits

@@ -36,8 +36,8 @@ EXCEEDED = 2.87e-7
 SCATTER = 1.5
 """Noise of the encoders over what is stated from which the ball may leave the travel by chance."""
 
-CHANCE_SHARE = 0.6
-"""Share of the gauges' room that chance may take: in what is left no pose could be measured."""
+CHANCE_SHARE = 0.9
+"""Share of the gauges' room that chance may take: beyond, no pose could be measured."""
 
 ROOM_KEPT = 0.5
 """Share of the gauges' room that a plunger has left on either side when the gauges are zeroed."""

@@ -25,10 +25,8 @@ DID_NOT_END = "did not run to its end"
 
 HEAD = """# Figures of the benchmarks
 
-Written by `make figures` from `build/figures.json`, which `make bench` writes in one pass over all
-benchmarks (`FULL=1` takes the samples of the targets, for hours). A figure that is not of the commit below
-names its own; those without a target are in that file only. Cases with one target share a row, where a
-value that several have is shown once.
+Written by `make figures` from `build/figures.json`, which `make bench` writes (`FULL=1`: with the samples \
+of the targets, for hours). A figure of another commit names it; cases with one target share a row. \
 **missed** is a target that was not reached. [Measured](measured.md) has what else was found.
 
 """
@@ -212,7 +210,8 @@ def table(figures: Iterable[Figure], present: str) -> str:
     alike: dict[tuple[str, str, str, str], list[Figure]] = {}
     for one in listed:
         if one not in never:
-            marks = [one.target] if one.target else []
+            target = one.target.replace("at most", "\N{LESS-THAN OR EQUAL TO}")
+            marks = [target.replace("at least", "\N{GREATER-THAN OR EQUAL TO}")] if target else []
             marks += [] if one.met else ["**missed**"]
             marks += [] if one.commit.rstrip("+") == present.rstrip("+") else [f"at {one.commit}"]
             alike.setdefault((_module(one), _name(one), one.unit, ", ".join(marks)), []).append(one)
@@ -231,8 +230,7 @@ def table(figures: Iterable[Figure], present: str) -> str:
         f"the {len(never)} of what must never happen, and did not, are not listed."
     )
     machines = "; ".join(sorted({one.machine for one in every}))
-    sizes = "; ".join(sorted({f"{_module(one)} {one.samples}" for one in every if one.samples}))
-    text = f"{HEAD}Commit {present}; {machines}. {counts}\n\nSamples: {sizes}.\n\n"
+    text = f"{HEAD}Commit {present}; {machines}. {counts}\n\n"
     return text + "\n".join(rows) + "\n"
 
 

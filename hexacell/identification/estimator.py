@@ -16,7 +16,7 @@ from hexacell.identification.data_faults.stepwise_selection import (
     select_faults,
 )
 from hexacell.identification.data_faults.units import wrong_unit
-from hexacell.identification.problem.problem import Problem
+from hexacell.identification.problem.problem import LEAST_SPARE_EQUATIONS, Problem
 from hexacell.identification.solver.fit import (
     COARSE,
     INCREMENTAL,
@@ -27,6 +27,7 @@ from hexacell.identification.solver.fit import (
 from hexacell.identification.solver.result import GaugeFaultError, Identification
 from hexacell.identification.terms.finding import Finding, TermFinding
 from hexacell.kinematics import rotations
+from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
 
 SAME_AXIS_RATIO = 0.02
@@ -77,7 +78,8 @@ def _without_faults(problem: Problem) -> tuple[Selection, tuple[TermFinding, ...
     Raises:
         UncorrectableFaultError: neither with terms nor without can the records be used.
     """
-    if not problem.offered or problem.terms is not None:
+    unknowns = len(problem.prior.covariance) + LEGS * len(problem.offered) + LEAST_SPARE_EQUATIONS
+    if not problem.offered or problem.terms is not None or problem.equations < unknowns:
         return select_faults(problem), ()
     first = fit_regularized(problem)
     chosen = choose_terms(first)

@@ -15,7 +15,7 @@ class SearchEffort:
         candidates: orientations that the pose of each record is chosen from; likewise for other poses.
         pilot_candidates: with four times as many the records are as good.
         planned_candidates: orientations that the sets of a forecast are chosen from, beside which records
-            have to gain: with a quarter of them, campaigns are half a percent less efficient.
+            have to gain.
         forecast_held_out_candidates: how wide held-out poses are hardly changes with more.
         checked_candidates: orientations among which preflight looks for any safe pose at a point.
         checked_robots: robots within the tolerances that preflight asks whether they reach the points.
@@ -27,7 +27,7 @@ class SearchEffort:
     candidates: int = 2048
     pilot_candidates: int = 256
     held_out_candidates: int = 2048
-    planned_candidates: int = 256
+    planned_candidates: int = 128
     forecast_held_out_candidates: int = 256
     checked_candidates: int = 128
     checked_robots: int = 32

@@ -20,6 +20,7 @@ from hexacell.identification.problem.problem import LEAST_SPARE_EQUATIONS, Probl
 from hexacell.identification.solver.fit import (
     COARSE,
     INCREMENTAL,
+    QUICK,
     SolverOptions,
     fit_regularized,
     solve_around_singularities,
@@ -81,10 +82,11 @@ def _without_faults(problem: Problem) -> tuple[Selection, tuple[TermFinding, ...
     unknowns = len(problem.prior.covariance) + LEGS * len(problem.offered) + LEAST_SPARE_EQUATIONS
     if not problem.offered or problem.terms is not None or problem.equations < unknowns:
         return select_faults(problem), ()
-    first = fit_regularized(problem)
+    quick = fit_regularized(problem, QUICK)
+    first = quick if quick.converged else fit_regularized(problem)
     chosen = choose_terms(first)
     if not chosen.taken:
-        return select_faults(problem), chosen.findings
+        return select_faults(problem, quick), chosen.findings
     nearly = fit_regularized(problem.started_at(first.free).with_terms(chosen.taken))
     # What the terms do is linearized once more, where they no longer bend the geometry.
     with_terms = with_terms_of(problem, nearly)

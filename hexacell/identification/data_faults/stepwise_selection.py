@@ -52,6 +52,7 @@ from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.fit import COARSE
 from hexacell.identification.solver.multistart import restarts
+from hexacell.identification.solver.result import Identification
 from hexacell.measurements.records import RecordId
 
 LARGEST_REJECTED_SHARE = 0.1
@@ -115,17 +116,20 @@ class Selection:
         return cls(CorrectedFit.fitted(problem, problem, options=COARSE), {})
 
 
-def select_faults(problem: Problem) -> Selection:
+def select_faults(problem: Problem, fit: Identification | None = None) -> Selection:
     """Fit a problem, corrected for all faults that are found and proven.
 
     Args:
         problem: all records, at least as many as determine the parameters.
+        fit: the quick fit of them, if it is known.
 
     Raises:
         UncorrectableFaultError: a gauge fault, or a zero shift that leaves too few records.
     """
     try:
-        uncorrected = CorrectedFit.uncorrected(problem)
+        uncorrected = (
+            CorrectedFit.uncorrected(problem) if fit is None else CorrectedFit(problem, problem, fit)
+        )
         selected = _forward(uncorrected)
         if len(selected.rejected) > 1 or not selected.is_consistent:
             # Readings in inches resemble a machine that needs no calibration, with some gross errors.

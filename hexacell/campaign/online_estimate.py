@@ -186,10 +186,12 @@ def _terms_are_due(found: Identification, before: ChainedEstimate) -> bool:
 
 
 def _with_terms(problem: Problem, found: Identification) -> ChainedEstimate | None:
-    """The estimate with the terms that the records show; None if they show none."""
-    chosen = choose_terms(found).taken
-    if not chosen:
-        return None
+    """The estimate with the terms that the records show; None if they show none, and nothing unexplained.
+
+    While records do not tell which of them the robot has, it may have all: less is known of it than its
+    records seem to say, and poses keep more of the gauges' travel.
+    """
+    chosen = choose_terms(found).taken or found.problem.offered
     nearly = estimate_online(problem.started_at(found.free).with_terms(chosen))
     better = estimate_online(with_terms_of(problem, nearly))
     return ChainedEstimate(better, terms=chosen, terms_tried=problem.records)

@@ -8,7 +8,7 @@ move least against that (:mod:`~hexacell.identification.diagnostics.frame_alignm
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.fields import Frozen
@@ -16,7 +16,7 @@ from hexacell.cell.measuring import AcceptanceSettings
 from hexacell.cell.model import CellSettings
 from hexacell.identification.diagnostics.frame_alignment import PoseErrors, choose_frames
 from hexacell.identification.identified_zeros import ParameterChoice
-from hexacell.kinematics.corrections import Corrections
+from hexacell.kinematics.corrections import NONE, Corrections
 from hexacell.kinematics.geometry import Geometry
 from hexacell.results.absorbed_terms import absorbing
 from hexacell.results.term_result import TermResult, corrections_for
@@ -87,4 +87,17 @@ def as_written(
         poses=robot.frames.inverse().poses(task.poses),
     )
     moved = TaskDisplacement.of(choice.displacement, settings.acceptance)
+    if corrections is not None and (corrections.play_mm, corrections.compliance_um_n) != (NONE, NONE):
+        corrections = _in_frames_of(choice.geometry, robot, corrections)
     return WrittenGeometry(choice.geometry, moved, corrections)
+
+
+def _in_frames_of(written: Geometry, robot: Robot, corrections: Corrections) -> Corrections:
+    """Corrections whose weight is stated in the drawing's frames, in those of a written geometry."""
+    drawn, own = (robot.mechanism.normalize_frames(one)[1] for one in (robot.drawing, written))
+    x, y, z = (own.base.T @ drawn.base @ corrections.weight_direction).round(9).tolist()
+    centre = corrections.weight_centre_mm
+    if centre is not None:
+        u, v, w = (own.platform.T @ drawn.platform @ centre).round(6).tolist()
+        centre = u, v, w
+    return replace(corrections, weight_direction=(x, y, z), weight_centre_mm=centre)

@@ -24,6 +24,7 @@ from hexacell.identification.belief import RobotBelief
 from hexacell.identification.choice_of_terms import choose_terms
 from hexacell.identification.estimator import estimate_online, with_terms_of, without_gross_errors
 from hexacell.identification.problem.problem import Problem
+from hexacell.identification.solver.chi_square import ChiSquareVerdict
 from hexacell.identification.solver.fit import COARSE, INCREMENTAL
 from hexacell.identification.solver.multistart import restarts
 from hexacell.identification.solver.result import Identification
@@ -182,7 +183,8 @@ def update_estimate(
 def _terms_are_due(found: Identification, before: ChainedEstimate) -> bool:
     """Whether residuals that the noise does not explain are a reason to choose terms, or others."""
     is_due = found.records >= RECORDS_FACTOR * before.terms_tried
-    return is_due and bool(found.problem.offered) and not found.noise_test.is_explained
+    is_too_large = found.noise_test.agreement is ChiSquareVerdict.TOO_LARGE
+    return is_due and bool(found.problem.offered) and is_too_large
 
 
 def _with_terms(problem: Problem, found: Identification) -> ChainedEstimate | None:

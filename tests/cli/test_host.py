@@ -46,9 +46,8 @@ asyncio.run(watch())
 
 
 @pytest.fixture
-def cell(quick_cell, tmp_path, monkeypatch) -> Cell:
-    runtime = tmp_path / "r"
-    runtime.mkdir()
+def cell(quick_cell, tmp_path_factory, monkeypatch) -> Cell:
+    runtime = tmp_path_factory.mktemp("r")  # the path of a socket must be short
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(runtime))
     monkeypatch.setenv("TMPDIR", str(runtime))
     return load_cell(quick_cell.cell)

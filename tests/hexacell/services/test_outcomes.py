@@ -79,7 +79,9 @@ def bend(site: Any, millimetres: float) -> None:
     bent = machine._geometry.vector + millimetres * np.sin(np.arange(42.0))
     with physics._lock:
         machine._geometry = Geometry(HEXAGLIDE_PARAMETERS, bent)
-        physics._joints = physics._joints + np.nan  # so that the platform is moved along at once
+        before, physics._joints = physics._pose, physics._joints + np.nan
+        physics._update()
+        assert physics._pose is not before, "the platform is moved along at once"
 
 
 async def test_a_result_that_verification_refuses_is_rolled_back_bit_for_bit(proposed, finished) -> None:

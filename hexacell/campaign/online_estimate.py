@@ -172,10 +172,7 @@ def update_estimate(
     kept = problem.subset(~problem.mask_of(before.false_records))
     found = _continued(kept, before.identification)
     if _terms_are_due(found, before):
-        with_terms = _with_terms(problem, found)
-        if with_terms is not None:
-            return with_terms
-        before = replace(before, terms_tried=problem.records)
+        return _with_terms(problem, found)
     following = _following(problem, kept, found, before, tries_others=tries_others)
     return replace(following, terms=before.terms, terms_tried=before.terms_tried)
 
@@ -187,8 +184,8 @@ def _terms_are_due(found: Identification, before: ChainedEstimate) -> bool:
     return is_due and bool(found.problem.offered) and is_too_large
 
 
-def _with_terms(problem: Problem, found: Identification) -> ChainedEstimate | None:
-    """The estimate with the terms that the records show; None if they show none, and nothing unexplained.
+def _with_terms(problem: Problem, found: Identification) -> ChainedEstimate:
+    """The estimate with the terms that the records show.
 
     While records do not tell which of them the robot has, it may have all: less is known of it than its
     records seem to say, and poses keep more of the gauges' travel.

@@ -44,6 +44,15 @@ class Placement:
         """Errors of the poses (n, 6, k) by errors (n, 6, k), mm, of the joint variables."""
         return np.asarray(self.by_constraints @ (self.derivatives.joints[..., None] * errors))
 
+    def as_joints(self, errors: Array) -> Array:
+        """Changes of the joint variables (n, 6) that do what errors (n, 6), mm, of the constraints do.
+
+        A leg at its dead point has none.
+        """
+        with np.errstate(divide="ignore", invalid="ignore"):
+            changes = errors / self.derivatives.joints
+        return np.nan_to_num(changes, posinf=0.0, neginf=0.0)
+
     def by_parameters(self, changes: Array) -> Array:
         """Errors of the poses (n, 6, k) by changes (P, k) of the parameters."""
         parameters = self.mechanism.parameters

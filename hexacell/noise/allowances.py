@@ -17,7 +17,7 @@ import numpy as np
 
 from hexacell.cell.model import CellSettings
 from hexacell.design.predicted_records import CHANCE_SIGMAS
-from hexacell.distributions import student_limit
+from hexacell.distributions import normal_probability, student_limit
 from hexacell.errors import LimitError
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.parameters import LEGS
@@ -29,9 +29,6 @@ from hexacell.robot.stated import gauge_travel_of
 
 SIGMAS = 5.0
 """Standard deviations up to which a difference is chance, at some hundred stops of six joints each."""
-
-EXCEEDED = 2.87e-7
-"""Probability that a normal variable is larger than that."""
 
 SCATTER = 1.5
 """Noise of the encoders over what is stated from which the ball may leave the travel by chance."""
@@ -70,7 +67,7 @@ class Allowances:
         visits = self.settings.noise.revisits
         if not self.is_measured or not visits or self.stops <= self.settings.noise.stops:
             return SIGMAS
-        return student_limit(LEGS * visits, EXCEEDED)
+        return student_limit(LEGS * visits, float(normal_probability(np.array(-SIGMAS))))
 
     @property
     def scatters(self) -> bool:

@@ -15,11 +15,10 @@ from hexacell.cell.model import CellSettings
 from hexacell.identification.diagnostics.pose_accuracy import error_jacobian, teachable_frames
 from hexacell.identification.problem.prior import Prior
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.model import Robot
-from hexacell.uncertainty.propagation import placement_of
+from hexacell.uncertainty.propagation import errors_by_term, placement_of
 
 WANTED_MM = 0.02
 """How near the poses are to be, beside how far parameters go from what was identified."""
@@ -44,12 +43,9 @@ def absorbing(
         return identified
     poses, frames = PoseBatch.joined([task.poses, task.workspace]), teachable_frames(belief, task.workspace)
     errors = np.zeros((len(poses), 6))
+    at_task, over = placement_of(belief, poses), placement_of(belief, task.workspace)
     for term in terms:
-        at_task, over = (
-            term.pose_errors(placement_of(belief, some), np.zeros((len(some), LEGS)))
-            for some in (poses, task.workspace)
-        )
-        errors = errors + frames.remove_frame_motion(poses, at_task, over) @ left[term.name]
+        errors = errors + errors_by_term(term, frames, at_task, over) @ left[term.name]
     radius = float(robot.mechanism.platform_radius(identified))
     weights = np.repeat([1.0, radius], 3) / WANTED_MM
     rows = (weights[:, None] * error_jacobian(belief, poses, task.workspace)).reshape(-1, len(belief.free))

@@ -13,13 +13,12 @@ from hexacell.identification.terms.finding import Finding
 from hexacell.identification.terms.term import ModelTerm
 from hexacell.kinematics.corrections import NO_CORRECTIONS, NONE, CorrectionKind, Corrections, Six
 from hexacell.kinematics.rotations import Array
+from hexacell.measurements.records import joints_of
 
 ANY_WEIGHT_N = 100.0
 
 CHANGE = 0.1
 """Share by which a coefficient may have changed since it was identified, one standard deviation."""
-
-Numbers = tuple[float, float, float, float, float, float]
 
 
 class TermResult(Frozen):
@@ -43,8 +42,8 @@ class TermResult(Frozen):
     predicted: float | None = None
     rival: str = ""
     unit: str = ""
-    values: Numbers | None = None
-    sigma: Numbers | None = None
+    values: Six | None = None
+    sigma: Six | None = None
 
     @property
     def is_taken(self) -> bool:
@@ -66,7 +65,11 @@ def term_results(found: Identification) -> tuple[TermResult, ...]:
         )
         if found.terms is not None and tried.name in terms:
             values, sigma = found.terms.of(tried.name)
-            update = {"unit": terms[tried.name].unit, "values": _six(values), "sigma": _six(sigma)}
+            update = {
+                "unit": terms[tried.name].unit,
+                "values": joints_of(values),
+                "sigma": joints_of(sigma),
+            }
             result = result.model_copy(update=update)
         results.append(result)
     return tuple(results)
@@ -84,11 +87,6 @@ def known_terms(offered: Iterable[ModelTerm], results: Iterable[TermResult]) -> 
     )
 
 
-def _six(values: Iterable[float]) -> Six:
-    q1, q2, q3, q4, q5, q6 = (float(value) for value in values)
-    return q1, q2, q3, q4, q5, q6
-
-
 def corrections_for(
     results: Iterable[TermResult],
     settings: CellSettings,
@@ -98,7 +96,8 @@ def corrections_for(
     """What a controller is to correct of the terms that were taken, and the coefficients that are left.
 
     Weight and centre are the cell file's. Of play only the sides matter on which the joints lie: they are
-    those of any weight.
+    those of any weight. No leg gets longer when it is pushed: a compliance that noise makes negative is
+    zero.
 
     Args:
         results: of all terms.
@@ -118,7 +117,7 @@ def corrections_for(
     wanted = Corrections(
         backlash=values.get("backlash", NONE),
         play_mm=values.get("play", NONE),
-        compliance_um_n=values.get("compliance", NONE),
+        compliance_um_n=joints_of(np.maximum(values.get("compliance", NONE), 0.0)),
         weight_n=stated.own_weight_n or ANY_WEIGHT_N,
         weight_direction=stated.own_weight_direction,
         weight_centre_mm=stated.own_weight_centre_mm,

@@ -157,6 +157,7 @@ class Robot:
 
         It takes less time with the problem ``before`` of some of these records.
         """
+        looks_for_terms = self.identifies is ParameterChoice.ALL and not self.known_terms
         assumptions = Assumptions(
             self.mechanism,
             self._commanding_as_written,
@@ -168,7 +169,7 @@ class Robot:
             systematic=partial(errors_by_effects, self.effects),
             unknowns=self.unknowns,
             travel_mm=self.limits.travels_mm,
-            offered=self.terms if self.identifies is ParameterChoice.ALL else (),
+            offered=self.terms if looks_for_terms else (),
             known_terms=self.known_terms,
         )
         return assumptions.problem(measurements, before)

@@ -30,10 +30,10 @@ from hexacell.identification.solver.result import Identification
 from hexacell.identification.solver.term_estimates import TermEstimates
 from hexacell.identification.terms.term import ModelTerm
 from hexacell.kinematics.corrections import NO_CORRECTIONS, Corrections
-from hexacell.kinematics.parameters import LEGS
+from hexacell.kinematics.parameters import LEGS, JointUnit
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.uncertainty.effect_kinds import COMMON_SCALE, common_encoder_scale
+from hexacell.uncertainty.effect_kinds import COMMON_SCALE, THOUSANDTH, common_encoder_scale
 from hexacell.uncertainty.effects import Effect, Occurrence, errors_of_records
 
 
@@ -180,11 +180,7 @@ class Propagation:
     def _by_term(self, term: ModelTerm) -> Array:
         if term.needs_directions:
             return np.zeros((len(self.task), 6, LEGS))
-        at_task, over = (
-            term.pose_errors(placement, np.zeros((len(placement), LEGS)))
-            for placement in (self.task, self.workspace)
-        )
-        return self.frames.remove_frame_motion(self.task.poses, at_task, over)
+        return errors_by_term(term, self.frames, self.task, self.workspace)
 
     def _direct(self, effect: Effect) -> Array:
         """Errors (t, 6, k) by the effect itself; frames cannot be fitted to what differs at every stop."""
@@ -196,14 +192,21 @@ class Propagation:
         return self.frames.remove_frame_motion(self.task.poses, errors, effect.on_poses(self.workspace))
 
 
+def errors_by_term(term: ModelTerm, frames: FrameFit, task: Placement, workspace: Placement) -> Array:
+    """Errors (t, 6, 6) at task poses by one unit of each coefficient of a term, with frames fitted."""
+    at_task, over = (term.pose_errors(at, np.zeros_like(at.joints)) for at in (task, workspace))
+    return frames.remove_frame_motion(task.poses, at_task, over)
+
+
 def _at_every_stop(term: ModelTerm, sizes: Array) -> Effect:
     """A term of some sizes (6,) where nobody knows from which side joints arrive."""
+    size = float(np.sqrt(np.mean(sizes**2))) / THOUSANDTH
+    unit, at_work = JointUnit(term.unit).thousandth, Occurrence.STOPS_AT_WORK
 
     def columns(at: Placement) -> Array:
-        return term.pose_errors(at, np.ones((len(at), LEGS))) * sizes
+        return np.asarray(term.pose_errors(at, np.ones_like(at.joints)) * sizes / size)
 
-    at_work, source = Occurrence.STOPS_AT_WORK, "identified"
-    return Effect(f"{term.name} not corrected", 1.0, "", at_work, columns, source=source)
+    return Effect(f"{term.name} that is left", size, unit, at_work, columns, source="identified")
 
 
 def placement_of(belief: RobotBelief, poses: PoseBatch) -> Placement:

@@ -143,21 +143,20 @@ class Calibration:
     def robot_checked(self, robot: Robot) -> Robot:
         """A robot as the accepted result left it, with its drift since, before a length check."""
         assert self.accepted is not None  # noqa: S101 - without one no length check is begun
-        before = self.before(robot, self.settings)
-        robot = replace(robot, known_terms=known_terms(robot.terms, self.accepted.terms))
-        return replace(robot, known=None if before is None else before.prior(1.0))
+        before = self.before(robot, self.accepted)
+        return replace(self.as_known(robot), known=before.prior(1.0))
 
-    def before(self, robot: Robot, settings: CellSettings) -> IdentifiedBefore | None:
-        """The geometry by the accepted result; None without one."""
+    def as_known(self, robot: Robot) -> Robot:
+        """A robot with the terms beside its geometry by the accepted result, if there is one."""
         if self.accepted is None:
-            return None
-        stated, parameters = self.accepted.identified, robot.mechanism.parameters
-        return identified_before(
-            robot,
-            np.array(self.accepted.covariance),
-            settings.check.drift_per_parameter_mm,
-            None if stated is None else Geometry.of(parameters, stated),
-        )
+            return robot
+        return replace(robot, known_terms=known_terms(robot.terms, self.accepted.terms))
+
+    def before(self, robot: Robot, accepted: AcceptedResult) -> IdentifiedBefore:
+        """The geometry by an accepted result."""
+        stated, drift = accepted.identified, self.settings.check.drift_per_parameter_mm
+        identified = None if stated is None else Geometry.of(robot.mechanism.parameters, stated)
+        return identified_before(robot, np.array(accepted.covariance), drift, identified)
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,10 +214,8 @@ class Knowledge:
     def check(self) -> Check:
         """The check of the robot as it is now."""
         calibration, wanted, accepted = self.calibration, self.settings.check, self.calibration.accepted
-        robot = self._at_temperatures(self.robot, self.settings)
-        before = calibration.before(robot, self.settings)
-        if accepted is not None:
-            robot = replace(robot, known_terms=known_terms(robot.terms, accepted.terms))
+        robot = calibration.as_known(self._at_temperatures(self.robot, self.settings))
+        before = None if accepted is None else calibration.before(robot, accepted)
         return Check(
             self.settings,
             robot,

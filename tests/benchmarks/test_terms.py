@@ -104,7 +104,7 @@ def sent_further(
         return np.zeros_like(joints)
     at = Placement(robot.mechanism, robot.commanding, poses, joints)
     errors = sum(term.leg_errors(at, came) * found.terms.of(term.name)[0] for term in found.terms.terms)
-    return np.asarray(-errors / at.derivatives.joints)
+    return -at.as_joints(np.asarray(errors))
 
 
 def carried_out(machine: Machine, number: int) -> Outcome:

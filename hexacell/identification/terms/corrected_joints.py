@@ -19,6 +19,4 @@ def added_to_joints(at: Placement, corrections: Corrections) -> Array:
     unknown = np.zeros_like(at.joints)
     errors = play(1.0, *acts).leg_errors(at, unknown) * corrections.play_mm
     yielding = compliance(1.0, corrections.weight_n, *acts).leg_errors(at, unknown)
-    errors = errors + yielding * corrections.compliance_um_n
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.nan_to_num(-errors / at.derivatives.joints, posinf=0.0, neginf=0.0))
+    return -at.as_joints(errors + yielding * corrections.compliance_um_n)

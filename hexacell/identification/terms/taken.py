@@ -99,7 +99,7 @@ def deformed(terms: tuple[ModelTerm, ...], records: RecordPlacement, values: Arr
         for row, term in enumerate(terms):
             coefficients = values[row * LEGS : (row + 1) * LEGS]
             errors = errors + term.leg_errors(at, records.directions) * coefficients
-        joints = records.joints + errors / records.derivatives.joints
+        joints = records.joints + records.as_joints(errors)
         solved = forward_kinematics(records.mechanism, records.geometry, joints, records.poses)
         kept = solved.found
         poses = records.poses.with_rows(kept, solved.poses[kept])

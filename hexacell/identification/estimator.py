@@ -79,8 +79,10 @@ def _without_faults(problem: Problem) -> tuple[Selection, tuple[TermFinding, ...
     Raises:
         UncorrectableFaultError: neither with terms nor without can the records be used.
     """
+    if problem.terms is not None:  # known before: linearized once more where the robot is
+        return select_faults(with_terms_of(problem, fit_regularized(problem))), ()
     unknowns = len(problem.prior.covariance) + LEGS * len(problem.offered) + LEAST_SPARE_EQUATIONS
-    if not problem.offered or problem.terms is not None or problem.equations < unknowns:
+    if not problem.offered or problem.equations < unknowns:
         return select_faults(problem), ()
     quick = fit_regularized(problem, QUICK)
     first = quick if quick.converged else fit_regularized(problem)

@@ -4,7 +4,6 @@ The bundled robot, 5 x 11 records, other equations (:mod:`tests.benchmarks.world
 what was found, as the identification has it; U and verdict are those of a run.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -16,9 +15,6 @@ from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.identification.placement import Placement
 from hexacell.identification.solver.result import Identification
-from hexacell.identification.terms.backlash import backlash
-from hexacell.identification.terms.compliance import compliance
-from hexacell.identification.terms.play import play
 from hexacell.kinematics.corrections import NO_CORRECTIONS, CorrectionKind
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -29,14 +25,12 @@ from hexacell.verdict.verification import HeldOut, verify
 from tests.benchmarks.figures import NEVER, at_least, at_most, least_by_chance
 from tests.benchmarks.machines import on_all_cores
 from tests.benchmarks.samples import sample
-from tests.benchmarks.worlds import budgets, encoders, legs
-from tests.benchmarks.worlds.effects import Effect, at_once
+from tests.benchmarks.worlds import budgets
+from tests.benchmarks.worlds.not_geometry import effect_of, terms_of
 from tests.benchmarks.worlds.trials import HELD_OUT_FROM, LIMIT_MM, records_after, settings, stated_limit
 from tests.benchmarks.worlds.world import World
 
 MACHINES = sample(__name__, "MACHINES")
-NEWTON, DOWN, CENTRE_MM = 100.0, np.array([0.0, 0.0, -1.0]), np.array([5.0, -3.0, 20.0])
-NOTHING = np.zeros(6)
 
 
 @dataclass(frozen=True)
@@ -80,22 +74,6 @@ class Outcome:
     taken: tuple[str, ...] = ()
 
 
-def effect_of(coefficients: Mapping[str, Array]) -> Effect:
-    """The machine by the worlds' own equations."""
-    return at_once(
-        encoders.hysteresis(0.5 * coefficients["backlash"]),
-        legs.play(0.5 * coefficients["play"], NEWTON * DOWN, CENTRE_MM),
-        legs.elastic(1e-3 * coefficients["compliance"], NEWTON * DOWN, CENTRE_MM),
-    )
-
-
-def offering(robot: Robot) -> Robot:
-    """A robot whose owner states the weight."""
-    base = robot.mechanism.normalize_frames(robot.drawing)[1].base
-    acts = base @ DOWN, CENTRE_MM
-    return replace(robot, terms=(backlash(0.1), play(0.1, *acts), compliance(0.3, NEWTON, *acts)))
-
-
 def sent_further(
     robot: Robot, found: Identification, poses: PoseBatch, joints: Array, came: Array
 ) -> Array:
@@ -110,7 +88,7 @@ def sent_further(
 def carried_out(machine: Machine, number: int) -> Outcome:
     own = settings()[number % len(settings())]
     coefficients = machine.drawn(np.random.default_rng([38, number]))
-    robot = offering(replace(own.robot, effects=budgets.machine("precision")))
+    robot = replace(own.robot, effects=budgets.machine("precision"), terms=terms_of(own.robot))
     world = World(robot, own.truth, effect_of(coefficients), number)
     try:
         found = identify(robot.problem(world.records(own.commands, robot.commanding)))

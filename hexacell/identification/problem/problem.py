@@ -339,7 +339,9 @@ class Assumptions:
             travel_mm=self.travel_mm,
             offered=self.offered,
         )
-        return made.with_terms(self.known_terms) if self.known_terms else made
+        if not self.known_terms:
+            return made
+        return made.with_terms(self.known_terms, np.concatenate([term.mean for term in self.known_terms]))
 
 
 def _interleaved(known: Values, rows: NDArray[np.intp], new: Values) -> Values:

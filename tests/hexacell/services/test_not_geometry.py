@@ -1,0 +1,34 @@
+"""On the wire: backlash, play and compliance are found, corrected in the config, and verified."""
+
+from typing import Any
+
+import pytest
+
+from hexacell.verdict.decision import Verdict
+from procedures.steps import events
+from tests.native_config import NATIVE
+
+PLAY_MM = (0.1, 0.08, 0.12, 0.1, 0.06, 0.1)
+YIELDING: dict[str, Any] = {
+    "identification__points": ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0), (0.0, 0.0, 550.0)),
+    "identification__orientations": 12,
+    "simulation__joints__backlash": (0.08,) * 6,
+    "simulation__legs__play_mm": PLAY_MM,
+    "simulation__legs__compliance_um_n": (0.3,) * 6,
+    "simulation__load__weight_n": 100.0,
+    "uncertainty__own_weight_n": 100.0,
+}
+
+
+async def test_the_controller_corrects_what_was_found_and_the_machine_passes(make_site) -> None:
+    site = make_site(**YIELDING)
+    ended = await site.calibrate()
+    [judged] = site.happened(events.ResultValidated)
+    assert judged.verdict is Verdict.PASS, ended.line
+    terms = site.happened(events.Identified)[0].result.terms
+    assert all(one.is_taken for one in terms), terms
+    written = NATIVE.read(site.cell.config_path).corrections
+    assert written.play_mm == pytest.approx(PLAY_MM, abs=0.02)
+    assert written.compliance_um_n == pytest.approx((0.3,) * 6, abs=0.15)
+    assert written.backlash == pytest.approx((0.08,) * 6, abs=0.02)
+    assert judged.verification.after_mm < 0.1 < judged.verification.before_mm

@@ -1,0 +1,63 @@
+"""Backlash that was found is no scatter: repeats are compared by where the joints stood."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hexacell.identification.estimator import identify
+from hexacell.kinematics.pose import Pose
+from hexacell.noise.allowances import SIGMAS, Allowances
+from procedures.calibration.repeatability import since_zero
+from procedures.run.readings import Reading
+from tests.benchmarks.worlds.campaigns import setting
+from tests.benchmarks.worlds.not_geometry import effect_of, terms_of
+from tests.benchmarks.worlds.world import World
+
+BACKLASH = np.full(6, 0.1)
+FROM_BELOW, FROM_BOTH_SIDES = (1,) * 6, (1, -1, 1, -1, 1, -1)
+
+
+def reading(ball: np.ndarray, joints: np.ndarray, directions: tuple[int, ...]) -> Reading:
+    return Reading(
+        answers=(),
+        counts=(),
+        skews_s=(),
+        gauges_mm=tuple(ball.tolist()),
+        spread_mm=(0.0, 0.0, 0.0),
+        joints=tuple(joints.tolist()),
+        directions=directions,
+    )
+
+
+@pytest.fixture(scope="module")
+def allowances() -> Allowances:
+    own = setting(0)
+    robot = replace(own.robot, terms=terms_of(own.robot))
+    world = World(robot, own.truth, effect_of({"backlash": BACKLASH}), 1)
+    found = identify(robot.problem(world.records(own.commands, robot.commanding)))
+    return Allowances(own.cell.settings, robot, is_measured=True, found=found)
+
+
+def test_a_reference_reached_from_another_side_is_no_slipped_gauge(allowances: Allowances) -> None:
+    reference = Pose(*allowances.settings.identification.points[0])
+    ball, encoders = allowances.ball_at(reference), np.zeros(6)
+    moved = ball.motion(-0.5 * BACKLASH * (np.array(FROM_BOTH_SIDES) - FROM_BELOW))
+    zero = reading(np.zeros(3), encoders, FROM_BELOW)
+    at_zero = SimpleNamespace(samples=[SimpleNamespace(reading=zero, pose=reference.as_tuple())])
+    now = reading(moved, encoders, FROM_BOTH_SIDES)
+    with_it, without = (
+        np.abs(since_zero(known, at_zero, now).unexplained_mm).max()  # type: ignore[arg-type]
+        for known in (allowances, replace(allowances, found=None))
+    )
+    assert without > 0.2
+    assert with_it < 0.3 * without
+
+
+def test_few_visits_leave_room_for_a_larger_scatter(allowances: Allowances) -> None:
+    scattering = replace(allowances.robot, noise=replace(allowances.robot.noise, stops=0.3))
+    measured = replace(allowances, robot=scattering)
+    assert measured.stop_sigmas > 1.15 * SIGMAS
+    assert replace(measured, is_measured=False).stop_sigmas == SIGMAS
+    assert measured.following == pytest.approx(measured.stop_sigmas * 0.3)

@@ -23,7 +23,7 @@ from hexacell.identification.placement import RecordPlacement
 from hexacell.identification.solver.linear_model import LinearCosts
 from hexacell.identification.solver.result import Identification
 from hexacell.identification.terms.finding import Finding, TermFinding
-from hexacell.identification.terms.taken import TakenTerms
+from hexacell.identification.terms.taken import TakenTerms, deformed
 from hexacell.identification.terms.term import ModelTerm
 
 ERROR_OF_FIRST_KIND = 0.01
@@ -38,10 +38,16 @@ DISTINCT = log(20.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChosenTerms:
-    """The terms taken, and what was found of each that was offered."""
+    """The terms taken, and what was found of each that was offered and that records can show."""
 
-    taken: tuple[ModelTerm, ...]
-    findings: tuple[TermFinding, ...]
+    taken: tuple[ModelTerm, ...] = ()
+    findings: tuple[TermFinding, ...] = ()
+    offered: tuple[ModelTerm, ...] = ()
+
+    @property
+    def are_likely(self) -> bool:
+        """Whether the records are more probable with any of them than without."""
+        return any(one.log_factor > 0.0 for one in self.findings)
 
 
 def choose_terms(found: Identification) -> ChosenTerms:
@@ -51,10 +57,10 @@ def choose_terms(found: Identification) -> ChosenTerms:
     """
     problem = found.problem
     knows_directions = bool(problem.directions.any())
-    offered = [term for term in problem.offered if knows_directions or not term.needs_directions]
+    offered = tuple(term for term in problem.offered if knows_directions or not term.needs_directions)
     if not offered:
-        return ChosenTerms((), ())
-    return _Search.of(found, offered).chosen()
+        return ChosenTerms()
+    return replace(_Search.of(found, offered).chosen(), offered=offered)
 
 
 Model = tuple[ModelTerm, ...]
@@ -66,7 +72,7 @@ class _Search:
 
     Attributes:
         without: the linear model of the records without terms.
-        records: where they were taken.
+        records: where they were taken, with the platform as the terms that the identification has bend it.
         offered: the terms, by their names.
         least: logarithm of the Bayes factor from which one is taken.
         scale: squared factor by which residuals exceed the noise with all terms.
@@ -82,7 +88,10 @@ class _Search:
     def of(cls, found: Identification, offered: Sequence[ModelTerm]) -> _Search:
         without = LinearCosts.at(replace(found.problem, terms=None), found.prediction)
         least = log(len(offered) / ERROR_OF_FIRST_KIND)
-        search = cls(without, found.placement, {term.name: term for term in offered}, least)
+        records = found.placement
+        if found.terms is not None:
+            records = deformed(found.terms.terms, records, found.terms.values)
+        search = cls(without, records, {term.name: term for term in offered}, least)
         with_all = search._model(tuple(offered)).residual_test(found.active_prior)
         return replace(search, scale=with_all.noise_factor**2)
 

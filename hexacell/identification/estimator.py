@@ -27,6 +27,7 @@ from hexacell.identification.solver.fit import (
 )
 from hexacell.identification.solver.result import GaugeFaultError, Identification
 from hexacell.identification.terms.finding import Finding, TermFinding
+from hexacell.identification.terms.term import ModelTerm
 from hexacell.kinematics import rotations
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
@@ -87,10 +88,11 @@ def _without_faults(problem: Problem) -> tuple[Selection, tuple[TermFinding, ...
     quick = fit_regularized(problem, QUICK)
     first = quick if quick.converged else fit_regularized(problem)
     chosen = choose_terms(first)
+    if chosen.are_likely:  # what they do is linearized where they do not bend the geometry
+        chosen = choose_terms(_fitted_with(chosen.offered, problem, first))
     if not chosen.taken:
         return select_faults(problem, quick), chosen.findings
-    nearly = fit_regularized(problem.started_at(first.free).with_terms(chosen.taken))
-    # What the terms do is linearized once more, where they no longer bend the geometry.
+    nearly = _fitted_with(chosen.taken, problem, first)
     with_terms = with_terms_of(problem, nearly)
     if nearly.goodness.is_explained:
         return select_faults(with_terms), chosen.findings
@@ -102,6 +104,12 @@ def _without_faults(problem: Problem) -> tuple[Selection, tuple[TermFinding, ...
         for one in chosen.findings
     )
     return plain or select_faults(problem), tuple(by_faults)
+
+
+def _fitted_with(terms: tuple[ModelTerm, ...], problem: Problem, first: Identification) -> Identification:
+    """The fit with terms, linearized where a fit with them is, from one without."""
+    nearly = fit_regularized(problem.started_at(first.free).with_terms(terms))
+    return fit_regularized(with_terms_of(problem, nearly))
 
 
 def with_terms_of(problem: Problem, found: Identification) -> Problem:

@@ -28,7 +28,7 @@ from hexacell.identification.placement import Placement
 from hexacell.identification.solver.measurement_model import NuisanceElimination
 from hexacell.identification.solver.result import Identification
 from hexacell.identification.solver.term_estimates import TermEstimates
-from hexacell.identification.terms.term import ModelTerm
+from hexacell.identification.terms.term import LegErrors, ModelTerm
 from hexacell.kinematics.corrections import NO_CORRECTIONS, Corrections
 from hexacell.kinematics.parameters import LEGS, JointUnit
 from hexacell.kinematics.pose import PoseBatch
@@ -167,15 +167,20 @@ class Propagation:
         return np.asarray(terms.values - corrected)
 
     def reversals(self, terms: TermEstimates | None) -> Iterator[Effect]:
-        """What is left of terms that act by the direction of arrival: another error at every stop."""
+        """What nobody knows the side of at work: another error at every stop.
+
+        A controller that corrects backlash knows from which side joints arrive, but nobody where the joints
+        of a leg lie that is hardly pulled or pushed.
+        """
         if terms is None:
             return
         left = self.uncorrected(terms)
         for row, term in enumerate(terms.terms):
-            if term.needs_directions:
+            if term.on_either_side is not None:
                 rows = slice(row * LEGS, (row + 1) * LEGS)
                 sigma = np.sqrt(np.diag(terms.covariance)[rows])
-                yield _at_every_stop(term, np.hypot(left[rows], sigma))
+                sizes = left[rows] if term.needs_directions else terms.values[rows]
+                yield _at_every_stop(term, term.on_either_side, np.hypot(sizes, sigma))
 
     def _by_term(self, term: ModelTerm) -> Array:
         if term.needs_directions:
@@ -198,15 +203,16 @@ def errors_by_term(term: ModelTerm, frames: FrameFit, task: Placement, workspace
     return frames.remove_frame_motion(task.poses, at_task, over)
 
 
-def _at_every_stop(term: ModelTerm, sizes: Array) -> Effect:
-    """A term of some sizes (6,) where nobody knows from which side joints arrive."""
+def _at_every_stop(term: ModelTerm, on_either_side: LegErrors, sizes: Array) -> Effect:
+    """A term of some sizes (6,) where nobody knows the side."""
     size = float(np.sqrt(np.mean(sizes**2))) / THOUSANDTH
     unit, at_work = JointUnit(term.unit).thousandth, Occurrence.STOPS_AT_WORK
 
     def columns(at: Placement) -> Array:
-        return np.asarray(term.pose_errors(at, np.ones_like(at.joints)) * sizes / size)
+        errors = on_either_side(at, np.zeros_like(at.joints)) * sizes / size
+        return np.asarray(at.by_constraints * errors[:, None, :])
 
-    return Effect(f"{term.name} that is left", size, unit, at_work, columns, source="identified")
+    return Effect(f"{term.name} on either side", size, unit, at_work, columns, source="identified")
 
 
 def placement_of(belief: RobotBelief, poses: PoseBatch) -> Placement:

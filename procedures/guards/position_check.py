@@ -29,8 +29,7 @@ from hexacell.cell.model import CellSettings
 from hexacell.clock import CellClock
 from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import CurrentConfig
-from hexacell.identification.placement import Placement
-from hexacell.identification.terms.corrected_joints import added_to_joints
+from hexacell.identification.terms.corrected_joints import commanded_joints
 from hexacell.kinematics.mechanism import Mechanism, joint_zeros
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -132,15 +131,13 @@ def _joints_of(
 ) -> tuple[Array, Array]:
     """Joint variables (6,), mm, of a pose, NaN if it is out of reach; what its tolerance does to them."""
     poses = PoseBatch.of([pose])
-    joints = mechanism.inverse(config.geometry, config.branch, poses)
-    at = Placement(mechanism, config.geometry, poses, np.nan_to_num(joints))
-    derivatives, added = at.derivatives, np.zeros(6)
-    if not config.corrections.are_none:
-        added = added_to_joints(at, config.corrections)[0]
+    states = config.geometry, config.branch, config.corrections
+    [joints], [added] = commanded_joints(mechanism, *states, poses)
+    derivatives = mechanism.derivatives(config.geometry, poses, np.nan_to_num(joints)[None])
     with np.errstate(divide="ignore", invalid="ignore"):
         slopes = np.linalg.norm(derivatives.pose[0, :, :3], axis=-1) / np.abs(derivatives.joints[0])
     rounding = position_mm * np.maximum(1.0, np.nan_to_num(slopes, nan=1.0, posinf=1.0))
-    return joints[0] + added, rounding + NOT_KNOWN * np.abs(added)
+    return joints, rounding + NOT_KNOWN * np.abs(added)
 
 
 def _excess(differences: Array, tolerances: Array) -> Array:

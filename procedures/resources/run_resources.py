@@ -13,6 +13,7 @@ from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
 from hexacell.clock import CellClock
 from hexacell.config.layout import CurrentConfig
+from hexacell.identification.terms.corrected_joints import commanded_joints
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import Directions, deviation_of, joints_of
@@ -143,7 +144,9 @@ class RunResources:
 
         def commanded() -> Array:
             now, mechanism = self.current_config.geometry(), self.calibration.robot.mechanism
-            joints: Array = mechanism.inverse(now.geometry, now.branch, PoseBatch.of([target]))[0]
+            states = now.geometry, now.branch, now.corrections
+            commands, _ = commanded_joints(mechanism, *states, PoseBatch.of([target]))
+            joints: Array = commands[0]
             return joints
 
         await self.guards.move(target, duration_s, watched, commanded)
@@ -152,7 +155,8 @@ class RunResources:
         """From which side each joint arrives at the end of a move, by the controller's straight line."""
         commanding, mechanism = self.current_config.geometry(), self.settings.mechanism
         line = interpolate_line(PoseBatch.of([start]), PoseBatch.of([target]), ARRIVAL_PIECES)
-        joints = mechanism.inverse(commanding.geometry, commanding.branch, line)
+        states = commanding.geometry, commanding.branch, commanding.corrections
+        joints, _ = commanded_joints(mechanism, *states, line)
         stops = self.calibration.known(state).allowances.stops
         least = least_way(mechanism.words.joint_unit, stops)
         return arrival_directions(joints, state.directions, least)

@@ -18,4 +18,9 @@ def backlash(size: float, unit: JointUnit = JointUnit.MM) -> ModelTerm:
     def lagging(placement: Placement, directions: Array) -> Array:
         return np.asarray(-0.5 * placement.derivatives.joints * directions)
 
-    return ModelTerm("backlash", str(unit), size, lagging, needs_directions=True)
+    def where_unknown(placement: Placement, directions: Array) -> Array:
+        return np.where(directions == 0.0, 0.5 * placement.derivatives.joints, 0.0)
+
+    return ModelTerm(
+        "backlash", str(unit), size, lagging, needs_directions=True, on_either_side=where_unknown
+    )

@@ -1,14 +1,22 @@
 """Play: the joints of a leg have clearance, and the leg is longer when it is pulled than when it is pushed.
 
 The side on which a joint lies follows from the sign of the force, that of the platform's weight; how heavy
-the platform is does not matter.
+the platform is does not matter. A leg that is hardly pulled or pushed may lie on either side: each side may
+bring the platform to where the force keeps it there.
 """
+
+from dataclasses import replace
 
 import numpy as np
 
 from hexacell.identification.placement import Placement, leg_forces
 from hexacell.identification.terms.term import ModelTerm
+from hexacell.kinematics.forward import apply_twist
+from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
+
+WRONG_SIDE = float(np.sqrt(0.5))
+"""Root mean square of an error that is as likely none as all of the play."""
 
 
 def play(size_mm: float, direction: Array, centre_mm: Array | None = None) -> ModelTerm:
@@ -17,4 +25,14 @@ def play(size_mm: float, direction: Array, centre_mm: Array | None = None) -> Mo
     def on_one_side(placement: Placement, _directions: Array) -> Array:
         return np.asarray(-0.5 * np.sign(leg_forces(placement, direction, centre_mm)))
 
-    return ModelTerm("play", "mm", size_mm, on_one_side)
+    def on_either_side(placement: Placement, _directions: Array) -> Array:
+        pulls = leg_forces(placement, direction, centre_mm) > 0.0
+        either = np.zeros_like(pulls)
+        for leg in range(LEGS):
+            for longer_mm in (-size_mm, size_mm):
+                moved = apply_twist(placement.poses, longer_mm * placement.by_constraints[:, :, leg])
+                there = leg_forces(replace(placement, poses=moved), direction, centre_mm)
+                either[:, leg] |= (there[:, leg] > 0.0) != pulls[:, leg]
+        return WRONG_SIDE * either
+
+    return ModelTerm("play", "mm", size_mm, on_one_side, on_either_side=on_either_side)

@@ -25,7 +25,7 @@ class TakenTerms:
         columns: (n, 3, k), mm: where the ball is by one standard deviation of each independent part of the
             coefficients of all terms.
         offset: (n, 3), mm: where it is by the coefficients that are expected.
-        unknown: (n, 6) variance of where joints are of which nobody knows from which side they came.
+        unknown: (n, 6) variance of where joints are, or seem to be, as nobody knows on which side they are.
     """
 
     terms: tuple[ModelTerm, ...]
@@ -63,7 +63,8 @@ class TakenTerms:
         for row, term in enumerate(terms):
             columns = slice(row * LEGS, (row + 1) * LEGS)
             by_coefficients[known, :, columns] = term.pose_errors(some, some.directions)[:, :3]
-        unknown = _unknown_places(terms, records.directions, values)
+        unknown = np.zeros_like(records.joints)
+        unknown[known] = _unknown_places(terms, some, values)
         return cls(terms, by_coefficients @ spread_of(terms), offset + by_coefficients @ mean, unknown)
 
     def __getitem__(self, rows: Mask | NDArray[np.intp]) -> TakenTerms:
@@ -77,13 +78,14 @@ class TakenTerms:
         return TakenTerms(self.terms, *map(np.concatenate, zip(mine, others, strict=True)))
 
 
-def _unknown_places(terms: tuple[ModelTerm, ...], directions: Array, values: Array | None) -> Array:
+def _unknown_places(terms: tuple[ModelTerm, ...], records: RecordPlacement, values: Array | None) -> Array:
     """Variance (n, 6) of joints that may be on either side, by coefficients of some values (6 m,)."""
-    variance = np.zeros_like(directions)
+    variance = np.zeros_like(records.joints)
     for row, term in enumerate(terms):
-        if term.needs_directions:
+        if term.on_either_side is not None:
             size = term.mean if values is None else values[row * LEGS : (row + 1) * LEGS]
-            variance = variance + np.where(directions == 0.0, (0.5 * size) ** 2, 0.0)
+            errors = size * term.on_either_side(records, records.directions)
+            variance = variance + records.as_joints(errors) ** 2
     return variance
 
 

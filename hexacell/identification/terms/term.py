@@ -34,6 +34,8 @@ class ModelTerm:
         leg_errors: what it does.
         takes_up: the effect of the uncertainty budget that it describes, by its name; empty for none.
         needs_directions: whether it acts by the side from which joints arrive.
+        on_either_side: the errors of legs that may have either sign, as nobody knows on which side they are
+            there; None where that is always known.
         mean: coefficients (6,) as they are expected.
         sigma: one standard deviation of each (6,), where they were identified before; None: see ``size``.
     """
@@ -44,6 +46,7 @@ class ModelTerm:
     leg_errors: LegErrors
     takes_up: str = ""
     needs_directions: bool = False
+    on_either_side: LegErrors | None = None
     mean: Array = field(default_factory=lambda: np.zeros(LEGS))
     sigma: Array | None = None
 

@@ -17,6 +17,10 @@ YIELDING: dict[str, Any] = {
     "simulation__legs__compliance_um_n": (0.3,) * 6,
     "simulation__load__weight_n": 100.0,
     "uncertainty__own_weight_n": 100.0,
+    "noise__encoder": 0.006,
+    "noise__gauge_mm": 0.006,
+    "simulation__gauges__noise_mm": 0.005,
+    "simulation__encoders__noise": 0.005,
 }
 
 
@@ -28,7 +32,8 @@ async def test_the_controller_corrects_what_was_found_and_the_machine_passes(mak
     terms = site.happened(events.Identified)[0].result.terms
     assert all(one.is_taken for one in terms), terms
     written = NATIVE.read(site.cell.config_path).corrections
-    assert written.play_mm == pytest.approx(PLAY_MM, abs=0.02)
-    assert written.compliance_um_n == pytest.approx((0.3,) * 6, abs=0.15)
-    assert written.backlash == pytest.approx((0.08,) * 6, abs=0.02)
-    assert judged.verification.after_mm < 0.1 < judged.verification.before_mm
+    # Some 0.01 mm and 0.05 um/N of a leg are not known.
+    assert written.play_mm == pytest.approx(PLAY_MM, abs=0.06)
+    assert written.compliance_um_n == pytest.approx((0.3,) * 6, abs=0.3)
+    assert written.backlash == pytest.approx((0.08,) * 6, abs=0.05)
+    assert judged.verification.after_mm < 0.15 < judged.verification.before_mm

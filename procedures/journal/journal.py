@@ -22,7 +22,6 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
@@ -188,16 +187,22 @@ def _write_whole(descriptor: int, data: bytes) -> None:
 
 def _parse(path: Path, stream: BinaryIO, longest_line: int = LONGEST_LINE) -> tuple[tuple[Entry, ...], int]:
     """The entries, and how many bytes of the file are whole lines."""
-    if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+    state = os.fstat(stream.fileno())
+    if not stat.S_ISREG(state.st_mode):
         raise FileError("this is not a file", subject=path, action="Check the path")
+
+    def most() -> int:
+        # What another process appends meanwhile is not read: half a line and then more would look damaged.
+        return min(longest_line, state.st_size - stream.tell())
+
     entries: list[Entry] = []
     whole = 0
     with _collector_at_rest():
-        while line := stream.readline(longest_line):
+        while line := stream.readline(most()):
             due = len(entries) + 1
             entry = decode(line, path, due)
             if entry is None:
-                parts = iter(partial(stream.read, longest_line), b"")
+                parts = iter(lambda: stream.read(most()), b"")
                 if begins_whole(line) or any(part.strip(b"\0") for part in parts):
                     problem = "this line of the journal is damaged"
                     raise FileError(problem, subject=path, line=due, action=RESTORE)

@@ -83,6 +83,25 @@ def test_a_journal_that_is_absent_or_in_no_folder_is_told(path: Path) -> None:
         Journal(path / "nowhere")
 
 
+def test_a_journal_is_read_while_another_process_appends_to_it(
+    path: Path, written: bytes, monkeypatch
+) -> None:
+    """Half a line when it was opened, the whole of it an instant later: not damaged."""
+    half = len(written) - 20
+    path.write_bytes(written[:half])
+    before = len(written.splitlines()) - 1
+    decode = line_format.decode
+
+    def appended_to(line: bytes, *others: Any) -> Any:
+        if not line.endswith(b"\n"):
+            path.write_bytes(written)
+        return decode(line, *others)
+
+    monkeypatch.setattr(line_format, "decode", appended_to)
+    assert len(read_journal(path)) == before
+    assert len(read_journal(path)) == before + 1
+
+
 def test_one_writer_at_a_time(path: Path) -> None:
     with Journal(path) as journal:
         journal.append(TOLD[0])

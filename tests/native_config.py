@@ -1,7 +1,6 @@
 """The config of a Hexaglide in the native format: one file."""
 
-from hexacell.config.layout import ConfigLayout, FormatOfFile
-from hexacell.config.toml_format import NativeToml
+from hexacell.config.toml_format import native_layout
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 
-NATIVE = ConfigLayout(HEXAGLIDE_PARAMETERS, (FormatOfFile("toml", NativeToml(HEXAGLIDE_PARAMETERS)),))
+NATIVE = native_layout(HEXAGLIDE_PARAMETERS)

@@ -6,7 +6,7 @@ from hexacell.cell.loader import Cell, load_cell
 from hexacell.config.layout import ConfigLayout, FormatOfFile
 from hexacell.config.linuxcnc_hal import HalPins
 from hexacell.config.linuxcnc_ini import LinuxcncIni
-from hexacell.config.toml_format import NativeToml
+from hexacell.config.toml_format import native_layout
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.gough_stewart import GOUGH_STEWART_PARAMETERS
 from tests.cli.cell_folder import CONFIGS
@@ -54,7 +54,7 @@ def ini_text(geometry: Geometry) -> str:
 
 def drawn_geometry() -> Geometry:
     """That of the bundled cell's controller."""
-    return NativeToml(GOUGH_STEWART_PARAMETERS).read(CONFIGS / f"{NAME}.controller.toml").geometry
+    return native_layout(GOUGH_STEWART_PARAMETERS).read(CONFIGS / f"{NAME}.controller.toml").geometry
 
 
 def write_config(folder: Path) -> tuple[Path, Path]:

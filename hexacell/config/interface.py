@@ -7,9 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
-from typing import Protocol, runtime_checkable
-
-import numpy as np
+from typing import Protocol
 
 from hexacell.cell.fields import LARGEST_NUMBER, Frozen
 from hexacell.errors import FileError
@@ -66,77 +64,28 @@ class ControllerGeometry:
     holds: frozenset[CorrectionKind] = frozenset()
 
 
-class ConfigFormat(Protocol):
-    """A kind of controller config.
-
-    A plug-in's class takes the parameters of the mechanism and ``[controller.config_options]`` of the cell
-    file, a mapping that it checks by itself.
-    """
-
-    def read(self, path: Path) -> ControllerGeometry:
-        """The geometry in the file.
-
-        Raises:
-            FileError: with file and line: absent, unreadable, or not a config that :meth:`rewrite` accepts.
-        """
-
-    def rewrite(self, text: str, geometry: Geometry) -> str:
-        """``text`` with the values of ``geometry``; every other character is kept.
-
-        Raises:
-            FileError: ``text`` is not such a config, or cannot hold ``geometry``.
-        """
-
-
 @dataclass(frozen=True, slots=True)
 class ConfigPart:
-    """What one of several files has of a geometry.
+    """What one file has of that: all of it, or a part.
 
     Attributes:
         values: by the parameters' names, each in its unit.
         branch: that of the robot; None where the file has nothing to do with it.
-        limits: those that the file has, if any.
     """
 
     values: Mapping[str, float]
     branch: Branch | None
     limits: ControllerLimits = field(default=ControllerLimits())
-
-
-@runtime_checkable
-class PartFormat(Protocol):
-    """A format whose files may have a part of the geometry each.
-
-    Its class takes ``is_part`` beside what that of a :class:`ConfigFormat` takes: then its options need not
-    say where all parameters are.
-    """
-
-    def read_part(self, text: str, source: Path | None) -> ConfigPart:
-        """The parameters that a text has, whichever they are; ``source`` is what errors name.
-
-        Raises:
-            FileError: one of them is there twice, or no number.
-        """
-
-    def rewrite_part(self, text: str, values: Mapping[str, float]) -> str:
-        """``text`` with other values of parameters that it has; every other character is kept.
-
-        Raises:
-            FileError: it has one of them not, or cannot hold its value.
-        """
-
-
-@dataclass(frozen=True, slots=True)
-class HeldCorrections:
-    """The corrections in one file, and the kinds of these that it has a place for."""
-
     corrections: Corrections = NO_CORRECTIONS
-    kinds: frozenset[CorrectionKind] = frozenset()
+    holds: frozenset[CorrectionKind] = frozenset()
 
 
-@runtime_checkable
-class CorrectionsFormat(Protocol):
-    """A format whose files may have corrections beside a geometry, or beside a part of it.
+class ConfigFormat(Protocol):
+    """A kind of controller config.
+
+    A plug-in's class takes the parameters of the mechanism, ``[controller.config_options]`` of the cell
+    file, a mapping that it checks by itself, and ``is_part``: whether the file is one of several, which has
+    some of the parameters, whichever they are, and whose options need not say where the others are.
 
     Attributes:
         holds: the kinds of corrections that such a file can have.
@@ -144,18 +93,22 @@ class CorrectionsFormat(Protocol):
 
     holds: frozenset[CorrectionKind]
 
-    def read_corrections(self, text: str, source: Path | None) -> HeldCorrections:
+    def read(self, text: str, source: Path | None) -> ConfigPart:
         """What a text has; ``source`` is what errors name.
 
         Raises:
-            FileError: with the line of a number that is none, or not physical.
+            FileError: with the line of what is absent, there twice, no number, or not physical.
         """
 
-    def rewrite_corrections(self, text: str, corrections: Corrections) -> str:
-        """``text`` with all numbers of ``corrections``; numbers that are absent are added.
+    def rewrite(
+        self, text: str, values: Mapping[str, float], corrections: Corrections | None = None
+    ) -> str:
+        """``text`` with other values of all parameters that it has; every other character is kept.
+
+        With ``corrections`` it gets all numbers of these; those that are absent are added.
 
         Raises:
-            FileError: it cannot hold them.
+            FileError: ``text`` is not such a config, or cannot hold these numbers.
         """
 
 
@@ -206,20 +159,6 @@ def replace_tokens(text: str, changed: Mapping[NumberToken, str]) -> str:
         parts += [text[end : token.start], changed[token]]
         end = token.end
     return "".join([*parts, text[end:]])
-
-
-def require_physical(geometry: Geometry) -> None:
-    """Refuse values that no config may get.
-
-    Raises:
-        FileError: a value is not finite, or a length is not above zero.
-    """
-    positive = [geometry[kind.symbol] for kind in geometry.parameters.kinds if kind.is_positive]
-    if not np.isfinite(geometry.vector).all() or not all((values > 0.0).all() for values in positive):
-        raise FileError(
-            "the new geometry has values that are not finite, or lengths that are not above zero",
-            action="Nothing was written; identify again",
-        )
 
 
 def token_error(token: NumberToken, problem: str, source: Path | None, action: str) -> FileError:

@@ -22,22 +22,18 @@ from pydantic import Field, ValidationError
 
 from hexacell.cell.fields import Positive, Section, Text, first_mistake
 from hexacell.config.interface import (
-    LARGEST_CONFIG_BYTES,
     ConfigPart,
-    ControllerGeometry,
     ControllerLimits,
     NumberToken,
     number_of,
     replace_tokens,
-    require_physical,
     token_error,
     write_number,
 )
 from hexacell.errors import FileError, UsageError
-from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.corrections import CorrectionKind, Corrections
 from hexacell.kinematics.mechanism import Branch
 from hexacell.kinematics.parameters import LEGS, GeometricParameter, ParameterSet, ParameterUnit
-from hexacell.storage import atomic_files
 
 Options = TypeVar("Options", bound=Section)
 
@@ -170,7 +166,9 @@ def _branch_of(parameters: ParameterSet, options: KeyedOptions) -> tuple[str, ..
 
 
 class KeyedConfig:
-    """A :class:`~hexacell.config.interface.ConfigFormat` of such texts, and a ``PartFormat``."""
+    """A :class:`~hexacell.config.interface.ConfigFormat` of such texts."""
+
+    holds: frozenset[CorrectionKind] = frozenset()
 
     def __init__(
         self,
@@ -184,45 +182,32 @@ class KeyedConfig:
     ) -> None:
         self._read_limits = read_limits
         self._parameters = parameters
+        self._is_part = is_part
         self._keys = NumberKeys.of(parameters, options, default, is_part=is_part)
         self._open = open_text
         self._unit_mm = options.unit_mm
 
-    def read(self, path: Path) -> ControllerGeometry:
-        """The geometry in the file; raises ``FileError`` with file and line."""
-        text = atomic_files.read_text(path, LARGEST_CONFIG_BYTES)
-        part = self._part(self._open(text, path), path, self._parameters.parameters)
-        geometry = Geometry(self._parameters, list(part.values.values()))
-        return ControllerGeometry(geometry, part.branch or (), part.limits)
+    def read(self, text: str, source: Path | None) -> ConfigPart:
+        """All parameters, or those whose keys are in the text; raises ``FileError`` with the line."""
+        lookup, there = self._open(text, source), self._parameters.parameters
+        if self._is_part:
+            there = tuple(one for one in there if any(map(lookup.has, self._keys_of(one))))
+        values = {one.name: self._value(lookup, one, source) for one in there}
+        return ConfigPart(values, self._branch(lookup, source), self._read_limits(lookup, source))
 
-    def rewrite(self, text: str, geometry: Geometry) -> str:
-        """``text`` with ``geometry`` in it, to 1 nm; a number that agrees to half of that is kept.
+    def rewrite(
+        self, text: str, values: Mapping[str, float], corrections: Corrections | None = None
+    ) -> str:
+        """``text`` with these values of parameters, to 1 nm; a number that agrees to half of that is kept.
 
         Raises:
-            FileError: a value is not finite, a length not above zero, or the text is no such config.
+            FileError: the text is no such config, or has no place for the corrections.
         """
-        require_physical(geometry)
-        values = geometry.vector.tolist()
-        return self.rewrite_part(text, dict(zip(self._parameters.names, values, strict=True)))
-
-    def read_part(self, text: str, source: Path | None) -> ConfigPart:
-        """The parameters whose keys are in the text; raises ``FileError`` with the line."""
-        lookup = self._open(text, source)
-        there = [one for one in self._parameters.parameters if any(map(lookup.has, self._keys_of(one)))]
-        return self._part(lookup, source, there)
-
-    def rewrite_part(self, text: str, values: Mapping[str, float]) -> str:
-        """``text`` with these values of parameters, as :meth:`rewrite` writes them."""
+        assert corrections is None  # noqa: S101 - such a text has a place for none of them
         new = [(one, values[one.name]) for one in self._parameters.parameters if one.name in values]
         changed = replace_tokens(text, dict(self._changed(self._open(text, None), new)))
         self._require_kept(self._open(changed, None), new)
         return changed
-
-    def _part(
-        self, lookup: NumberLookup, source: Path | None, there: Iterable[GeometricParameter]
-    ) -> ConfigPart:
-        values = {one.name: self._value(lookup, one, source) for one in there}
-        return ConfigPart(values, self._branch(lookup, source), self._read_limits(lookup, source))
 
     def _changed(
         self, lookup: NumberLookup, new: Iterable[tuple[GeometricParameter, float]]

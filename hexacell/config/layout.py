@@ -5,10 +5,12 @@ and the zeros of the legs in the INI file. Each parameter is looked for in every
 """
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import reduce
 from pathlib import Path
+
+import numpy as np
 
 from hexacell.config.interface import (
     LARGEST_CONFIG_BYTES,
@@ -16,10 +18,6 @@ from hexacell.config.interface import (
     ConfigPart,
     ControllerGeometry,
     ControllerLimits,
-    CorrectionsFormat,
-    HeldCorrections,
-    PartFormat,
-    require_physical,
 )
 from hexacell.errors import FileError
 from hexacell.kinematics.corrections import NO_CORRECTIONS, CorrectionKind, Corrections
@@ -41,8 +39,7 @@ class FormatOfFile:
 class ConfigLayout:
     """The formats of a config's files, in the order in which the cell file names the files.
 
-    Every method takes one path or text for each of them, in that order. If there are several, each format
-    is a :class:`~hexacell.config.interface.PartFormat`.
+    Every method takes one path or text for each of them, in that order.
     """
 
     parameters: ParameterSet
@@ -55,8 +52,7 @@ class ConfigLayout:
 
         Whether the files at hand have a place for them, :attr:`.ControllerGeometry.holds` says.
         """
-        every = (one.reader for one in self.formats)
-        return frozenset().union(*(one.holds for one in every if isinstance(one, CorrectionsFormat)))
+        return frozenset().union(*(one.reader.holds for one in self.formats))
 
     def read(self, *paths: Path) -> ControllerGeometry:
         """The geometry in the files, and the corrections.
@@ -65,24 +61,15 @@ class ConfigLayout:
             FileError: with file and line: a file is absent, unreadable or no such config, or a parameter is
                 in none of the files, or in two.
         """
-        found = self._read_geometry(paths)
-        if not self.holds:
-            return found
-        texts = [atomic_files.read_text(path, LARGEST_CONFIG_BYTES) for path in paths]
-        corrections, places = self._corrections(texts, paths)
-        return replace(found, corrections=corrections, holds=frozenset(places))
-
-    def _read_geometry(self, paths: Sequence[Path]) -> ControllerGeometry:
-        if len(self.formats) == 1:
-            [path] = paths
-            return self.formats[0].reader.read(path)
         parts = self._parts([atomic_files.read_text(path, LARGEST_CONFIG_BYTES) for path in paths], paths)
         values = self._values(parts, paths)
-        limits = reduce(ControllerLimits.narrowed, (part.limits for part in parts))
+        corrections, places = _corrections(parts, paths)
         return ControllerGeometry(
             Geometry(self.parameters, [values[name] for name in self.parameters.names]),
             self._branch(parts, paths),
-            limits,
+            reduce(ControllerLimits.narrowed, (part.limits for part in parts)),
+            corrections,
+            frozenset(places),
         )
 
     def rewrite(
@@ -93,80 +80,27 @@ class ConfigLayout:
         Without ``corrections`` they stay as they are.
 
         Raises:
-            FileError: a text is no such config, or cannot hold its part of these.
+            FileError: a text is no such config, or cannot hold its part of these; or the geometry has
+                values that no config may get.
         """
-        new = self._with_geometry(texts, geometry)
-        return new if corrections is None else self._with_corrections(new, corrections)
-
-    def _with_geometry(self, texts: Sequence[str], geometry: Geometry) -> tuple[str, ...]:
-        if len(self.formats) == 1:
-            [text] = texts
-            return (self.formats[0].reader.rewrite(text, geometry),)
-        require_physical(geometry)
+        _require_physical(geometry)
         values = dict(zip(self.parameters.names, geometry.vector.tolist(), strict=True))
+        stand_ins = [Path(f"file {number}") for number, _ in enumerate(texts, start=1)]
         parts = self._parts(texts, [None] * len(texts))
-        self._values(parts, self._stand_ins)
-        return tuple(
-            one.rewrite_part(text, {name: values[name] for name in part.values})
-            for one, text, part in zip(self._part_formats, texts, parts, strict=True)
-        )
-
-    def _with_corrections(self, texts: Sequence[str], corrections: Corrections) -> tuple[str, ...]:
-        found, places = self._corrections(texts, self._stand_ins)
-        for kind in CorrectionKind:
-            if kind not in places and corrections.of(kind) != found.of(kind):
-                raise FileError(
-                    f"the controller's config has no place for corrections of {kind}",
-                    action="Nothing was written; name the file that has it in [[controller.further_files]]",
-                )
-        new = list(texts)
-        for place in {*places.values()}:
+        self._values(parts, stand_ins)
+        found, places = _corrections(parts, stand_ins)
+        if corrections is not None:
+            _require_places(corrections, found, places)
+        new: list[str] = []
+        for place, (one, text, part) in enumerate(zip(self.formats, texts, parts, strict=True)):
             kinds = [kind for kind, where in places.items() if where == place]
-            reader = self.formats[place].reader
-            assert isinstance(reader, CorrectionsFormat)  # noqa: S101 - it has a place for them
-            new[place] = reader.rewrite_corrections(new[place], NO_CORRECTIONS.taking(corrections, kinds))
+            own = NO_CORRECTIONS.taking(corrections, kinds) if corrections is not None and kinds else None
+            new.append(one.reader.rewrite(text, {name: values[name] for name in part.values}, own))
         return tuple(new)
 
-    def _corrections(
-        self, texts: Sequence[str], paths: Sequence[Path]
-    ) -> tuple[Corrections, Mapping[CorrectionKind, int]]:
-        """The corrections in all texts, and which of these has a place for each kind.
-
-        Raises:
-            FileError: two have numbers of the same kind.
-        """
-        held = [
-            one.reader.read_corrections(text, path)
-            if isinstance(one.reader, CorrectionsFormat)
-            else HeldCorrections()
-            for one, text, path in zip(self.formats, texts, paths, strict=True)
-        ]
-        found, places = NO_CORRECTIONS, dict[CorrectionKind, int]()
-        for kind in CorrectionKind:
-            having = [place for place, one in enumerate(held) if any(one.corrections.of(kind))]
-            if len(having) > 1:
-                raise _not_in_one(kind, [paths[place] for place in having], paths)
-            able = [place for place, one in enumerate(held) if kind in one.kinds]
-            for place in (having or able)[:1]:
-                found = found.taking(held[place].corrections, [kind])
-                if place in able:
-                    places[kind] = place
-        return found, places
-
-    @property
-    def _stand_ins(self) -> list[Path]:
-        """What errors call texts that are in no files."""
-        return [Path(f"file {number}") for number, _ in enumerate(self.formats, start=1)]
-
-    @property
-    def _part_formats(self) -> Iterator[PartFormat]:
-        for one in self.formats:
-            assert isinstance(one.reader, PartFormat)  # noqa: S101 - whoever makes a layout sees to it
-            yield one.reader
-
     def _parts(self, texts: Sequence[str], sources: Sequence[Path | None]) -> list[ConfigPart]:
-        files = zip(self._part_formats, texts, sources, strict=True)
-        return [one.read_part(text, source) for one, text, source in files]
+        files = zip(self.formats, texts, sources, strict=True)
+        return [one.reader.read(text, source) for one, text, source in files]
 
     def _values(self, parts: Sequence[ConfigPart], paths: Sequence[Path]) -> Mapping[str, float]:
         found: dict[str, float] = {}
@@ -184,6 +118,47 @@ class ConfigLayout:
         if len(found) != 1:
             raise _not_in_one("branch", [path for _, path in found], paths)
         return found[0][0]
+
+
+def _corrections(
+    parts: Sequence[ConfigPart], paths: Sequence[Path]
+) -> tuple[Corrections, Mapping[CorrectionKind, int]]:
+    """The corrections in all files, and which of these has a place for each kind.
+
+    Raises:
+        FileError: two have numbers of the same kind.
+    """
+    found, places = NO_CORRECTIONS, dict[CorrectionKind, int]()
+    for kind in CorrectionKind:
+        having = [place for place, one in enumerate(parts) if any(one.corrections.of(kind))]
+        if len(having) > 1:
+            raise _not_in_one(kind, [paths[place] for place in having], paths)
+        able = [place for place, one in enumerate(parts) if kind in one.holds]
+        for place in (having or able)[:1]:
+            found = found.taking(parts[place].corrections, [kind])
+            if place in able:
+                places[kind] = place
+    return found, places
+
+
+def _require_places(wanted: Corrections, found: Corrections, places: Mapping[CorrectionKind, int]) -> None:
+    """Refuse corrections that differ from those ``found`` and have no place in any file."""
+    for kind in CorrectionKind:
+        if kind not in places and wanted.of(kind) != found.of(kind):
+            raise FileError(
+                f"the controller's config has no place for corrections of {kind}",
+                action="Nothing was written; name the file that has it in [[controller.further_files]]",
+            )
+
+
+def _require_physical(geometry: Geometry) -> None:
+    """Refuse values that are not finite, and lengths that are not above zero."""
+    positive = [geometry[kind.symbol] for kind in geometry.parameters.kinds if kind.is_positive]
+    if not np.isfinite(geometry.vector).all() or not all((values > 0.0).all() for values in positive):
+        raise FileError(
+            "the new geometry has values that are not finite, or lengths that are not above zero",
+            action="Nothing was written; identify again",
+        )
 
 
 def _not_in_one(name: str, having: Sequence[Path], paths: Sequence[Path]) -> FileError:

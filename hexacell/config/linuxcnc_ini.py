@@ -20,7 +20,7 @@ LinuxCNC would not see, or see otherwise than a person, is refused.
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, log10
 from pathlib import Path
@@ -32,8 +32,8 @@ from hexacell.cell.fields import LARGEST_NUMBER, Text
 from hexacell.config.interface import (
     LARGEST_BACKLASH,
     LARGEST_CONFIG_BYTES,
+    ConfigPart,
     ControllerLimits,
-    HeldCorrections,
     NumberToken,
     Range,
     number_of,
@@ -72,26 +72,29 @@ class LinuxcncIni(KeyedConfig):
             is_part=is_part,
         )
 
-    def read_corrections(self, text: str, source: Path | None) -> HeldCorrections:
-        """The backlash of the joints in the text; raises ``FileError`` with the line."""
-        ini = IniText(text, source, "")
-        found = [_backlash(ini, joint, self._unit_mm) for joint in JOINTS]
+    def read(self, text: str, source: Path | None) -> ConfigPart:
+        """As any keyed config, with the backlash of the joints; raises ``FileError`` with the line."""
+        part, ini = super().read(text, source), IniText(text, source, "")
+        backlash = cast("Six", tuple(_backlash(ini, joint, self._unit_mm) for joint in JOINTS))
         has_place = all(ini.has_section(joint) and not ini.has(f"{joint}/{COMP_FILE}") for joint in JOINTS)
-        backlash = cast("Six", tuple(found))
-        return HeldCorrections(Corrections(backlash), self.holds if has_place else frozenset())
+        holds = self.holds if has_place else frozenset[CorrectionKind]()
+        return replace(part, corrections=Corrections(backlash), holds=holds)
 
-    def rewrite_corrections(self, text: str, corrections: Corrections) -> str:
-        """``text`` with another backlash; a variable that is absent becomes the last one of its section.
+    def rewrite(
+        self, text: str, values: Mapping[str, float], corrections: Corrections | None = None
+    ) -> str:
+        """As any keyed config, with another backlash, if that is given.
+
+        A variable that is absent becomes the last one of its section.
 
         Raises:
-            FileError: it reads back with another number.
+            FileError: a number reads back as another one.
         """
-        new = text
-        for joint, wanted in zip(JOINTS, corrections.backlash, strict=True):
+        new = super().rewrite(text, values)
+        joints = zip(JOINTS, corrections.backlash if corrections is not None else (), strict=False)
+        for joint, wanted in joints:
             new = _with_backlash(IniText(new, None, ""), joint, self._unit_mm, wanted)
-        after = self.read_corrections(new, None).corrections.backlash
-        for joint, found, wanted in zip(JOINTS, after, corrections.backlash, strict=True):
-            if abs(found - wanted) > 10.0**-BACKLASH_DECIMALS:
+            if abs(_backlash(IniText(new, None, ""), joint, self._unit_mm) - wanted) > LAST_DECIMAL:
                 raise FileError(
                     f"the new backlash of [{joint}] reads back with another number",
                     action="Nothing was written; please report this with the config",
@@ -225,6 +228,7 @@ JOINTS = tuple(f"JOINT_{leg}" for leg in range(LEGS))
 BACKLASH, COMP_FILE = "BACKLASH", "COMP_FILE"
 BACKLASH_DECIMALS = 6
 """1 nm, and less in a larger unit."""
+LAST_DECIMAL = 10.0**-BACKLASH_DECIMALS
 
 
 def _backlash(ini: IniText, joint: str, unit_mm: float) -> float:
@@ -242,7 +246,7 @@ def _backlash(ini: IniText, joint: str, unit_mm: float) -> float:
 
 def _with_backlash(ini: IniText, joint: str, unit_mm: float, wanted: float) -> str:
     """The text with another backlash of a joint, if it is another by half of its last decimal."""
-    if abs(wanted - _backlash(ini, joint, unit_mm)) <= 0.5 * 10.0**-BACKLASH_DECIMALS:
+    if abs(wanted - _backlash(ini, joint, unit_mm)) <= 0.5 * LAST_DECIMAL:
         return ini.text
     unit = 1.0 if _turns(ini, joint) else unit_mm
     number = write_number(wanted / unit, BACKLASH_DECIMALS + max(0, ceil(log10(unit))))

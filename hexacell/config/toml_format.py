@@ -14,6 +14,8 @@ and ``[corrections]`` (:mod:`~hexacell.config.toml_corrections`). The file belon
 write-back changes the numbers of the geometry and of the corrections, and no other character.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,23 +25,14 @@ from typing import Any, cast
 import numpy as np
 
 from hexacell.cell.fields import LARGEST_NUMBER
-from hexacell.config.interface import (
-    LARGEST_CONFIG_BYTES,
-    ConfigPart,
-    ControllerGeometry,
-    ControllerLimits,
-    HeldCorrections,
-    JointRanges,
-    require_physical,
-    write_number,
-)
+from hexacell.config.interface import ConfigPart, ControllerLimits, JointRanges, write_number
+from hexacell.config.layout import ConfigLayout, FormatOfFile
 from hexacell.config.toml_corrections import read_corrections, with_corrections
 from hexacell.errors import FileError, UsageError
 from hexacell.kinematics.corrections import CorrectionKind, Corrections
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
 from hexacell.kinematics.parameters import LEGS, ParameterKind, ParameterSet
-from hexacell.storage import atomic_files
 from hexacell.storage.toml_document import KeyPath, TomlDocument
 
 
@@ -57,7 +50,7 @@ class NativeToml:
         parameters: ParameterSet,
         given: Mapping[str, Any] = MappingProxyType({}),
         *,
-        is_part: bool = False,  # noqa: ARG002 - it has no options that could be incomplete
+        is_part: bool = False,
     ) -> None:
         if given:
             raise UsageError(
@@ -65,69 +58,66 @@ class NativeToml:
                 action="Remove [controller.config_options], or name another config_format",
             )
         self._parameters = parameters
+        self._is_part = is_part
 
-    def read(self, path: Path) -> ControllerGeometry:
-        """The geometry and the branch in the file; raises ``FileError`` with file and line."""
-        text = atomic_files.read_text(path, LARGEST_CONFIG_BYTES)
-        content = _Content(TomlDocument.parse(text, path), self._parameters)
-        limits = ControllerLimits(joints=content.joint_ranges())
-        return ControllerGeometry(content.geometry(), content.branch(), limits)
+    def read(self, text: str, source: Path | None) -> ConfigPart:
+        """All parameters, or the kinds that ``[geometry]`` has; raises ``FileError`` with the line."""
+        content = self._content(TomlDocument.parse(text, source))
+        there = content.parameters
+        vector = content.geometry().vector.tolist() if there.kinds else []
+        return ConfigPart(
+            dict(zip(there.names, vector, strict=True)),
+            content.branch() if there.has_branch or not self._is_part else None,
+            ControllerLimits(joints=content.joint_ranges()),
+            read_corrections(content.document),
+            self.holds,
+        )
 
-    def rewrite(self, text: str, geometry: Geometry) -> str:
-        """``text`` with ``geometry`` in it, with as many decimals as the unit has (1 nm), no exponent.
+    def rewrite(
+        self, text: str, values: Mapping[str, float], corrections: Corrections | None = None
+    ) -> str:
+        """``text`` with these values of all its parameters, and with these corrections, if any.
 
-        A value that differs by no more than half of the last decimal keeps its token. A geometry with a
-        value that is not finite, or a length that is not above zero, is refused; the new text is read
-        again before it is returned.
+        They have as many decimals as the unit has (1 nm), no exponent. A value that differs by no more than
+        half of the last decimal keeps its token; the new text is read again before it is returned.
         """
-        require_physical(geometry)
-        document = TomlDocument.parse(text)
-        before, tokens = _Content(document, self._parameters).geometry(), dict[KeyPath, str]()
-        for kind in self._parameters.kinds:
+        content = self._content(TomlDocument.parse(text))
+        there = content.parameters
+        changed = text
+        if there.kinds:
+            changed = self._with_geometry(content, Geometry(there, [values[name] for name in there.names]))
+        return changed if corrections is None else with_corrections(changed, corrections)
+
+    def _with_geometry(self, content: _Content, geometry: Geometry) -> str:
+        before, tokens, parameters = content.geometry(), dict[KeyPath, str](), content.parameters
+        for kind in parameters.kinds:
             old, half_of_last = before[kind.symbol], 0.5 * 10.0**-kind.unit.decimals
             for index, new in np.ndenumerate(geometry[kind.symbol]):
                 if abs(new - old[index]) > half_of_last:
                     tokens["geometry", kind.symbol, *index] = write_number(float(new), kind.unit.decimals)
-        changed = document.replaced(tokens)
-        after = _Content(TomlDocument.parse(changed), self._parameters).geometry()
-        last_decimal = {kind.symbol: 10.0**-kind.unit.decimals for kind in self._parameters.kinds}
-        if (abs(after.vector - geometry.vector) > self._parameters.by_kind(last_decimal)).any():
+        changed = content.document.replaced(tokens)
+        after = self._content(TomlDocument.parse(changed)).geometry()
+        last_decimal = {kind.symbol: 10.0**-kind.unit.decimals for kind in parameters.kinds}
+        if (abs(after.vector - geometry.vector) > parameters.by_kind(last_decimal)).any():
             raise FileError(
                 "the new geometry reads back with different numbers",
                 action="Nothing was written; please report this with the config",
             )
         return changed
 
-    def read_part(self, text: str, source: Path | None) -> ConfigPart:
-        """The kinds of parameters that ``[geometry]`` has; raises ``FileError`` with the line."""
-        document = TomlDocument.parse(text, source)
-        there = self._kinds_in(document)
-        content = _Content(document, there)
-        values = (
-            dict(zip(there.names, content.geometry().vector.tolist(), strict=True)) if there.kinds else {}
-        )
-        branch = content.branch() if there.has_branch else None
-        return ConfigPart(values, branch, ControllerLimits(joints=content.joint_ranges()))
-
-    def rewrite_part(self, text: str, values: Mapping[str, float]) -> str:
-        """``text`` with these values, of all parameters of some kinds, as :meth:`rewrite` writes them."""
-        there = self._kinds_in(TomlDocument.parse(text))
-        return NativeToml(there).rewrite(text, Geometry(there, [values[name] for name in there.names]))
-
-    def read_corrections(self, text: str, source: Path | None) -> HeldCorrections:
-        """``[corrections]``, if there is any; raises ``FileError`` with the line."""
-        return HeldCorrections(read_corrections(TomlDocument.parse(text, source)), self.holds)
-
-    def rewrite_corrections(self, text: str, corrections: Corrections) -> str:
-        """``text`` with these corrections, with as many decimals as they need; raises ``FileError``."""
-        return with_corrections(text, corrections)
-
-    def _kinds_in(self, document: TomlDocument) -> ParameterSet:
+    def _content(self, document: TomlDocument) -> _Content:
+        if not self._is_part:
+            return _Content(document, self._parameters)
         section = document.data.get("geometry")
         names = {*section} if isinstance(section, dict) else set()
         has_branch = self._parameters.has_branch and "branch" in names | {*document.data}
         kinds = tuple(kind for kind in self._parameters.kinds if kind.symbol in names)
-        return ParameterSet(kinds, has_branch)
+        return _Content(document, ParameterSet(kinds, has_branch))
+
+
+def native_layout(parameters: ParameterSet) -> ConfigLayout:
+    """The layout of a config that is one file in this format."""
+    return ConfigLayout(parameters, (FormatOfFile("toml", NativeToml(parameters)),))
 
 
 @dataclass(frozen=True, slots=True)

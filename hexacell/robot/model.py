@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from hexacell.cell.model import CellSettings
 from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import ConfigLayout, FormatOfFile
 from hexacell.config.linuxcnc_ini import limits_of_ini
-from hexacell.errors import FileError, UsageError
+from hexacell.errors import FileError
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.geometry_change import largest_change
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation, tolerance_violations
@@ -34,7 +33,6 @@ from hexacell.kinematics.commanded_motion import CommandedRobot, RefusedCommands
 from hexacell.kinematics.corrections import NO_CORRECTIONS, CorrectionKind, Corrections
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism, joint_zeros
-from hexacell.kinematics.parameters import ParameterSet
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.limits.limits import Limits
@@ -249,28 +247,17 @@ def config_layout(settings: CellSettings) -> ConfigLayout:
     """The readers and writers of the files of a cell's controller config.
 
     Raises:
-        UsageError: there is no such format, its options are wrong, or it cannot be one of several.
+        UsageError: there is no such format, or its options are wrong.
     """
     controller, parameters = settings.controller, settings.mechanism.parameters
     is_part = bool(controller.further_files)
     files = [(controller.config_format, controller.config_options)]
     files += [(one.config_format, one.config_options) for one in controller.further_files]
-    formats = (_format_of(*file, parameters, is_part=is_part) for file in files)
-    return ConfigLayout(parameters, tuple(formats), settings.mechanism.words.joint_unit)
-
-
-def _format_of(
-    name: str, options: Mapping[str, Any], parameters: ParameterSet, *, is_part: bool
-) -> FormatOfFile:
-    factory = load(Group.CONFIG_FORMATS, name)
-    if not is_part:
-        return FormatOfFile(name, factory(parameters, options))
-    if not hasattr(factory, "read_part"):
-        raise UsageError(
-            f"the config format '{name}' cannot have a part of the geometry only",
-            action="Remove [[controller.further_files]], or use another format",
-        )
-    return FormatOfFile(name, factory(parameters, options, is_part=True))
+    formats = tuple(
+        FormatOfFile(name, load(Group.CONFIG_FORMATS, name)(parameters, options, is_part=is_part))
+        for name, options in files
+    )
+    return ConfigLayout(parameters, formats, settings.mechanism.words.joint_unit)
 
 
 def controller_geometry(cell: Cell, *paths: Path) -> ControllerGeometry:

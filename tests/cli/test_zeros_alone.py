@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from hexacell.config.toml_format import NativeToml
+from hexacell.config.toml_format import native_layout
 from hexacell.kinematics.mechanisms.gough_stewart import GOUGH_STEWART_PARAMETERS
 from tests.cli.cell_folder import CONFIGS
 from tests.cli.commands import run_command
@@ -40,12 +40,12 @@ def cell_in(folder: Path) -> Path:
 def test_the_zeros_of_a_machine_that_is_as_drawn_are_written_and_pass(tmp_path: Path) -> None:
     cell = cell_in(tmp_path)
     config = tmp_path / f"{NAME}.controller.toml"
-    before = NativeToml(GOUGH_STEWART_PARAMETERS).read(config).geometry
+    before = native_layout(GOUGH_STEWART_PARAMETERS).read(config).geometry
     run = run_command(tmp_path, "run", cell, "--unattended", "--mode", "optimise", "--json")
     assert run.code == 0, run.err
     assert run.document["line"].startswith("zeros only, 6 of 33 parameters, 20 records at 5 points")
     assert run.document["line"].endswith("(limit 0.3): pass")
-    after = NativeToml(GOUGH_STEWART_PARAMETERS).read(config).geometry
+    after = native_layout(GOUGH_STEWART_PARAMETERS).read(config).geometry
     for symbol in ("base", "platform"):
         assert (after[symbol] == before[symbol]).all()
     built = [599.478, 598.015, 601.32, 598.618, 599.07, 601.521]

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from hexacell.cell.loader import load_cell
 from hexacell.config.interface import ControllerGeometry
-from hexacell.config.toml_format import NativeToml
+from hexacell.config.toml_format import native_layout
 from hexacell.errors import FileError
 from hexacell.kinematics.mechanism import FrameTransform, inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
@@ -61,7 +61,7 @@ def copied(cell, tmp_path):
 
 def test_the_taught_geometry_is_in_the_file_that_the_cell_names(copied, paper):
     text = copied.config_path.read_text()
-    copied.taught_path.write_text(NativeToml(HEXAGLIDE_PARAMETERS).rewrite(text, paper.actual))
+    copied.taught_path.write_text(native_layout(HEXAGLIDE_PARAMETERS).rewrite([text], paper.actual)[0])
     robot = robot_of(copied)
     assert robot.taught is not None
     np.testing.assert_allclose(robot.taught.vector, paper.actual.vector)

@@ -14,7 +14,8 @@ from hexacell.cell.by_mechanism import cell_model
 from hexacell.cell.described_devices import DESCRIBED_GAUGES
 from hexacell.cell.loader import load_cell, validated
 from hexacell.cell.robot import DEFAULT_MECHANISM
-from hexacell.config.toml_format import NativeToml
+from hexacell.config.layout import ConfigLayout
+from hexacell.config.toml_format import native_layout
 from hexacell.errors import FileError, HexacellError, flatten_errors
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.plugins import Group, load, names
@@ -239,7 +240,7 @@ class CellDraft:
         """Before it is calibrated, a controller has the geometry of the drawing."""
         document["controller"]["config"] = given.strip()
         try:
-            read = _config_format().read(self.path.parent / given.strip())
+            read = _config_layout().read(self.path.parent / given.strip())
         except HexacellError as error:
             raise ValueError(str(error)) from error
         document["robot"]["nominal"] = read.geometry.document()
@@ -249,11 +250,11 @@ class CellDraft:
         found = []
         for path in sorted(self.path.parent.glob("*.toml")):
             with suppress(HexacellError):
-                _config_format().read(path)
+                _config_layout().read(path)
                 found.append(path.name)
         return found[0] if len(found) == 1 else "robot.toml"
 
 
-def _config_format() -> NativeToml:
+def _config_layout() -> ConfigLayout:
     mechanism: Mechanism = load(Group.MECHANISMS, DEFAULT_MECHANISM)()
-    return NativeToml(mechanism.parameters)
+    return native_layout(mechanism.parameters)

@@ -18,7 +18,7 @@ from hexacell.cell.loader import Cell, load_cell
 from hexacell.cell.model import CellSettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
-from hexacell.config.toml_format import NativeToml
+from hexacell.config.toml_format import native_layout
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
@@ -70,7 +70,7 @@ class Twin:
 
     def joints_for(self, pose: Pose) -> Array:
         """The slider positions of a pose by the controller's geometry."""
-        branch = NativeToml(HEXAGLIDE_PARAMETERS).read(self.config).branch
+        branch = native_layout(HEXAGLIDE_PARAMETERS).read(self.config).branch
         joints: Array = inverse_kinematics(Hexaglide(), self.commanding, branch, PoseBatch.of([pose]))[0]
         return joints
 
@@ -125,7 +125,7 @@ def make_twin(bundled_cell: Cell) -> MakeTwin:
         changes = STILL | {key.replace("__", "."): value for key, value in changes.items()}
         simulation = changed(simulation, changes)
         config = bundled_cell.config_path
-        read = NativeToml(HEXAGLIDE_PARAMETERS).read(config)
+        read = native_layout(HEXAGLIDE_PARAMETERS).read(config)
         clock = StillClock()
         physics = RobotPhysics(Hexaglide(), simulation, clock, read, home)
         machine = SimulatedMachine(Hexaglide(), NATIVE, (config,), physics, clock, home)

@@ -12,7 +12,7 @@ from drivers.encoders.cia406 import Cia406Bank
 from drivers.interfaces import StartupAction
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.model import CellSettings
-from hexacell.config.toml_format import NativeToml
+from hexacell.config.toml_format import native_layout
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.pose import Pose
 from hexacell.plugins import Group, load
@@ -88,7 +88,7 @@ async def test_reloading_reads_the_config_and_moves_nothing(bundled_cell) -> Non
             config = bundled_cell.config_path
             values = bundled_cell.settings.simulation.geometry.model_dump()
             truth = hexaglide_geometry(values["S"], values["B"], values["l"])
-            config.write_text(NativeToml(HEXAGLIDE_PARAMETERS).rewrite(config.read_text(), truth))
+            config.write_text(native_layout(HEXAGLIDE_PARAMETERS).rewrite([config.read_text()], truth)[0])
             await controller.reload(ALL)
             assert cell.machine.joints() == pytest.approx(sliders, abs=1e-6)
             assert (await pose_of(controller)).position != pytest.approx(believed.position, abs=0.5)

@@ -17,7 +17,7 @@ from drivers.simulated.physics import RobotPhysics
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.cell.simulation import SimulatedLoad
-from hexacell.config.toml_format import NativeToml
+from hexacell.config.toml_format import native_layout
 from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.gough_stewart import GOUGH_STEWART_PARAMETERS, GoughStewart
@@ -50,7 +50,7 @@ class Machine:
         self.settings = changed(cell.settings.simulation, keys)
         parameters = self.mechanism.parameters
         self.geometry = Geometry.of(parameters, self.settings.geometry.model_dump())
-        self.commanding = NativeToml(parameters).read(cell.config_path)
+        self.commanding = native_layout(parameters).read(cell.config_path)
         self.home = Pose(*cell.settings.identification.points[0])
         poses = [
             Pose(*(np.array(self.home.as_tuple()) + off))

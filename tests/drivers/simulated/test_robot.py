@@ -9,7 +9,7 @@ import pytest
 
 from drivers.simulated.linuxcnc.state import MotionRefused
 from drivers.simulated.robot import LINE_STEPS
-from hexacell.config.toml_format import NativeToml
+from hexacell.config.toml_format import native_layout
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
@@ -21,7 +21,7 @@ TILTED = Pose(5.0, -3.0, 548.0, 6.0, -4.0, 2.0)
 
 def rewrite(twin: Any, geometry: Geometry) -> None:
     text = twin.config.read_text()
-    twin.config.write_text(NativeToml(HEXAGLIDE_PARAMETERS).rewrite(text, geometry))
+    twin.config.write_text(native_layout(HEXAGLIDE_PARAMETERS).rewrite([text], geometry)[0])
 
 
 def test_the_pose_during_a_move_is_between_start_and_end(twin) -> None:

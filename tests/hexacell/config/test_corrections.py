@@ -91,8 +91,7 @@ def assert_same(found: Corrections, wanted: Corrections) -> None:
 
 def geometry_in(text: str) -> Geometry:
     [reader] = NATIVE.formats
-    assert isinstance(reader.reader, NativeToml)
-    values = reader.reader.read_part(text, None).values
+    values = reader.reader.read(text, None).values
     return Geometry(NATIVE.parameters, [values[name] for name in NATIVE.parameters.names])
 
 
@@ -242,17 +241,15 @@ def test_backlash_as_linuxcnc_takes_it(joint: str, added: str, problem: str, bac
     text = ini_text(drawn_geometry()).replace(joint, f"{joint}\r\n{added}")
     if problem:
         with pytest.raises(FileError, match=problem) as caught:
-            INI.read_corrections(text, None)
+            INI.read(text, None)
         assert caught.value.line is not None
         return
-    found = INI.read_corrections(text, None)
+    found = INI.read(text, None)
     assert found.corrections.backlash == pytest.approx((0.0, backlash, 0.0, 0.0, 0.0, 0.0))
-    assert found.kinds == (frozenset() if "COMP_FILE" in added else {CorrectionKind.BACKLASH})
-    if found.kinds:
-        new = INI.rewrite_corrections(text, LAGGING)
-        assert INI.read_corrections(new, None).corrections.backlash == pytest.approx(
-            LAGGING.backlash, abs=1e-6
-        )
+    assert found.holds == (frozenset() if "COMP_FILE" in added else {CorrectionKind.BACKLASH})
+    if found.holds:
+        new = INI.rewrite(text, found.values, LAGGING)
+        assert INI.read(new, None).corrections.backlash == pytest.approx(LAGGING.backlash, abs=1e-6)
 
 
 def test_of_two_files_the_one_with_joints_gets_the_backlash(tmp_path: Path) -> None:
@@ -280,12 +277,10 @@ def test_backlash_in_two_files_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_plug_in_that_knows_of_no_corrections_holds_none(config: Path) -> None:
-    class PlugIn:
-        def __init__(self) -> None:
-            self.native = NativeToml(NATIVE.parameters)
-            self.read, self.rewrite = self.native.read, self.native.rewrite
+    class PlugIn(NativeToml):
+        holds = frozenset()
 
-    layout = ConfigLayout(NATIVE.parameters, (FormatOfFile("plug-in", PlugIn()),))
+    layout = ConfigLayout(NATIVE.parameters, (FormatOfFile("plug-in", PlugIn(NATIVE.parameters)),))
     found = layout.read(config)
     assert layout.holds == found.holds == frozenset()
     assert found.corrections == NO_CORRECTIONS

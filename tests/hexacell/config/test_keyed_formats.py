@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hexacell.config.interface import ConfigFormat, write_number
+from hexacell.config.layout import ConfigLayout, FormatOfFile
 from hexacell.config.line_templates import LineTemplates
 from hexacell.config.linuxcnc_hal import HalPins
 from hexacell.config.linuxcnc_ini import LinuxcncIni
@@ -60,16 +61,20 @@ def write_lines(number: Callable[[str], str], gap: str) -> list[str]:
     return rows
 
 
+def one_file(form: ConfigFormat) -> ConfigLayout:
+    return ConfigLayout(HEXAGLIDE_PARAMETERS, (FormatOfFile("a format", form),))
+
+
 @dataclass(frozen=True)
 class Kind:
-    form: ConfigFormat
+    form: ConfigLayout
     write: Callable[[Callable[[str], str], str], list[str]]
 
 
 KINDS = {
-    "ini": Kind(LinuxcncIni(HEXAGLIDE_PARAMETERS, INI), write_ini),
-    "hal": Kind(HalPins(HEXAGLIDE_PARAMETERS, HAL), write_hal),
-    "template": Kind(LineTemplates(HEXAGLIDE_PARAMETERS, LINES), write_lines),
+    "ini": Kind(one_file(LinuxcncIni(HEXAGLIDE_PARAMETERS, INI)), write_ini),
+    "hal": Kind(one_file(HalPins(HEXAGLIDE_PARAMETERS, HAL)), write_hal),
+    "template": Kind(one_file(LineTemplates(HEXAGLIDE_PARAMETERS, LINES)), write_lines),
 }
 BY_NAME = pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
 
@@ -116,7 +121,7 @@ def test_every_number_is_read_and_a_write_of_the_same_is_byte_identical(written,
     found = kind.form.read(written(text))
     assert found.branch == tuple(SIGNS)
     assert found.geometry.vector == pytest.approx([float(tokens[name]) for name in tokens], abs=0.0)
-    assert kind.form.rewrite(text, found.geometry) == text
+    assert kind.form.rewrite([text], found.geometry) == (text,)
 
 
 @given(configs(), st.data())
@@ -126,7 +131,7 @@ def test_a_write_changes_the_tokens_of_what_changed_and_nothing_else(written, co
     rows = data.draw(st.lists(st.integers(0, 41), min_size=1, max_size=5, unique=True))
     new = found.vector.copy()
     new[rows] += 1.234567
-    changed = kind.form.rewrite(text, Geometry(HEXAGLIDE_PARAMETERS, new))
+    [changed] = kind.form.rewrite([text], Geometry(HEXAGLIDE_PARAMETERS, new))
     assert kind.form.read(written(changed)).geometry.vector == pytest.approx(new, abs=1e-6)
     pieces = re.split(r"([^\s,={}]+)", text), re.split(r"([^\s,={}]+)", changed)
     different = [(one, other) for one, other in zip(*pieces, strict=True) if one != other]
@@ -176,23 +181,23 @@ def test_an_unphysical_geometry_is_not_written(kind, value) -> None:
     vector = np.full(42, 1.5)
     vector[41] = value
     with pytest.raises(FileError, match="Nothing was written"):
-        kind.form.rewrite(body, Geometry(HEXAGLIDE_PARAMETERS, vector))
+        kind.form.rewrite([body], Geometry(HEXAGLIDE_PARAMETERS, vector))
 
 
 def test_an_inch_machine_keeps_a_nanometre(written) -> None:
-    form = HalPins(HEXAGLIDE_PARAMETERS, HAL | {"unit_mm": 25.4})
+    form = one_file(HalPins(HEXAGLIDE_PARAMETERS, HAL | {"unit_mm": 25.4}))
     text = "\n".join(write_hal(lambda _: "20.5", " "))
     geometry = form.read(written(text)).geometry
     assert geometry.vector == pytest.approx(np.full(42, 520.7), rel=1e-15)
-    assert form.rewrite(text, geometry) == text
+    assert form.rewrite([text], geometry) == (text,)
     new = Geometry(HEXAGLIDE_PARAMETERS, geometry.vector + np.linspace(0.1, 0.2, 42))
-    again = form.read(written(form.rewrite(text, new))).geometry
+    again = form.read(written(form.rewrite([text], new)[0])).geometry
     assert again.vector == pytest.approx(new.vector, abs=5e-7)
 
 
 def test_corrections_are_written_beside_the_nominal_numbers(written) -> None:
     options = INI | {"corrections": {"S": "DS{leg}{COMPONENT}", "l": "DL{leg}"}}
-    form = LinuxcncIni(HEXAGLIDE_PARAMETERS, options)
+    form = one_file(LinuxcncIni(HEXAGLIDE_PARAMETERS, options))
     rows = write_ini(lambda _: "100.0", " ")
     zeros = [f"DS{leg}{axis} = 0" for leg in range(1, 7) for axis in "XYZ"]
     zeros += [f"DL{leg} = 0.5" for leg in range(1, 7)]
@@ -201,7 +206,7 @@ def test_corrections_are_written_beside_the_nominal_numbers(written) -> None:
     assert geometry["l"] == pytest.approx(np.full(6, 100.5))
     new = geometry.vector.copy()
     new[[0, 20, 41]] += 0.25
-    changed = form.rewrite(text, Geometry(HEXAGLIDE_PARAMETERS, new)).splitlines()
+    changed = form.rewrite([text], Geometry(HEXAGLIDE_PARAMETERS, new))[0].splitlines()
     different = {other for one, other in zip(text.splitlines(), changed, strict=True) if one != other}
     assert different == {"DS1X = 0.25", "DL6 = 0.75", "B1Z = 100.25"}
 
@@ -209,7 +214,7 @@ def test_corrections_are_written_beside_the_nominal_numbers(written) -> None:
 class TestWhatLinuxcncSees:
     """As ``inivar`` of LinuxCNC 2.9 answers, see ``linuxcnc``."""
 
-    FORM = LinuxcncIni(HEXAGLIDE_PARAMETERS, INI)
+    FORM = one_file(LinuxcncIni(HEXAGLIDE_PARAMETERS, INI))
 
     @pytest.mark.parametrize(
         ("inserted", "reason"),
@@ -234,7 +239,7 @@ class TestWhatLinuxcncSees:
             self.FORM.read(written("\n".join(rows)))
 
     def test_a_variable_of_another_section_by_its_name(self, written) -> None:
-        form = LinuxcncIni(HEXAGLIDE_PARAMETERS, INI | {"names": {"l": "JOINT_{index}/LENGTH"}})
+        form = one_file(LinuxcncIni(HEXAGLIDE_PARAMETERS, INI | {"names": {"l": "JOINT_{index}/LENGTH"}}))
         rows = [row for row in write_ini(lambda _: "1.5", " ") if not re.match(r"L\d", row)]
         joints = [f"[JOINT_{n}]\nTYPE = LINEAR\nLENGTH = {n + 600}" for n in range(6)]
         found = form.read(written("\n".join([*rows, *joints])))
@@ -247,7 +252,7 @@ def limits(lowest: float, highest: float) -> list[str]:
 
 def test_limits_of_the_joints_in_the_same_ini_file_are_read(written) -> None:
     rows = write_ini(lambda _: "1.5", " ")
-    form = LinuxcncIni(HEXAGLIDE_PARAMETERS, INI | {"unit_mm": 25.4})
+    form = one_file(LinuxcncIni(HEXAGLIDE_PARAMETERS, INI | {"unit_mm": 25.4}))
     found = form.read(written("\n".join([*rows, *limits(-10.0, 20.0)])))
     assert found.limits.joints is not None
     assert found.limits.joints[5] == pytest.approx((-254.0, 635.0))
@@ -259,7 +264,7 @@ def test_limits_of_the_joints_in_the_same_ini_file_are_read(written) -> None:
 def test_a_pin_set_to_a_variable_names_the_other_format(written) -> None:
     rows = write_hal(lambda name: "[HEXAGLIDE]S1X" if name == "S1x" else "1.5", " ")
     with pytest.raises(FileError, match="a variable of the INI file") as caught:
-        HalPins(HEXAGLIDE_PARAMETERS, HAL).read(written("\n".join(rows)))
+        one_file(HalPins(HEXAGLIDE_PARAMETERS, HAL)).read(written("\n".join(rows)))
     assert "linuxcnc-ini" in (caught.value.action or "")
 
 

@@ -5,16 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hexacell.cell.loader import load_cell
 from hexacell.config.layout import ConfigLayout, FormatOfFile
 from hexacell.config.line_templates import LineTemplates
 from hexacell.config.linuxcnc_hal import HalPins
 from hexacell.config.linuxcnc_ini import LinuxcncIni
 from hexacell.config.toml_format import NativeToml
-from hexacell.errors import FileError, HexacellError, UsageError
+from hexacell.errors import FileError, HexacellError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
-from hexacell.robot.model import config_layout, controller_geometry
+from hexacell.robot.model import controller_geometry
 from tests.several_config_files import LAYOUT, drawn_geometry, hexapod_cell, write_config
 
 SIGNS = [1, 1, 1, -1, -1, -1]
@@ -149,9 +148,3 @@ class TestTheCellFile:
         )
         cell = hexapod_cell(tmp_path, *edits)
         assert [path.name for path in cell.taught_paths] == ["old.hal", "old.ini"]
-
-    def test_a_format_that_takes_the_whole_geometry_only(self, tmp_path, monkeypatch) -> None:
-        cell = load_cell(hexapod_cell(tmp_path).path)
-        monkeypatch.setattr("hexacell.robot.model.load", lambda *_: lambda *_: None)
-        with pytest.raises(UsageError, match="'linuxcnc-hal' cannot have a part of the geometry only"):
-            config_layout(cell.settings)

@@ -11,15 +11,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.config.interface import ConfigFormat, write_number
-from hexacell.config.toml_format import NativeToml
+from hexacell.config.interface import write_number
+from hexacell.config.toml_format import native_layout
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.parameters import ParameterUnit
 from hexacell.storage.toml_document import TomlDocument
 
-FORMAT: ConfigFormat = NativeToml(HEXAGLIDE_PARAMETERS)
+FORMAT = native_layout(HEXAGLIDE_PARAMETERS)
 HALF_A_NANOMETRE = 5e-7
 
 AT_THE_TOP = [
@@ -135,11 +135,11 @@ def test_only_number_tokens_change_and_only_where_the_values_do(
     old, new = numbers
     text, geometry = layout.render(token_by_name(old)), Geometry(HEXAGLIDE_PARAMETERS, new)
     same = Geometry(HEXAGLIDE_PARAMETERS, [tomllib.loads(f"x = {token}")["x"] for token in old])
-    assert FORMAT.rewrite(text, same) == text
+    assert FORMAT.rewrite([text], same) == (text,)
     expected = [expected_token(one, value) for one, value in zip(old, new.tolist(), strict=True)]
-    changed = FORMAT.rewrite(text, geometry)
+    [changed] = FORMAT.rewrite([text], geometry)
     assert changed == layout.render(token_by_name(expected))
-    assert FORMAT.rewrite(changed, geometry) == changed
+    assert FORMAT.rewrite([changed], geometry) == (changed,)
 
 
 @pytest.mark.parametrize(
@@ -237,14 +237,14 @@ def test_no_geometry_is_written_that_could_not_be_read(
     vector = geometry.vector.copy()
     vector[place] = value
     with pytest.raises(FileError, match="the new geometry has values"):
-        FORMAT.rewrite(GOOD, Geometry(HEXAGLIDE_PARAMETERS, vector))
+        FORMAT.rewrite([GOOD], Geometry(HEXAGLIDE_PARAMETERS, vector))
 
 
 def test_a_leg_too_short_for_six_decimals_is_refused(geometry: Geometry) -> None:
     vector = geometry.vector.copy()
     vector[36] = 1e-9
     with pytest.raises(FileError, match="above zero"):
-        FORMAT.rewrite(GOOD, Geometry(HEXAGLIDE_PARAMETERS, vector))
+        FORMAT.rewrite([GOOD], Geometry(HEXAGLIDE_PARAMETERS, vector))
 
 
 def test_a_geometry_that_does_not_read_back_is_never_written(
@@ -253,7 +253,7 @@ def test_a_geometry_that_does_not_read_back_is_never_written(
     replaced = TomlDocument.replaced
     monkeypatch.setattr(TomlDocument, "replaced", lambda *args: replaced(*args).replace("700.", "70."))
     with pytest.raises(FileError, match="reads back with different numbers"):
-        FORMAT.rewrite(config.read_text(), geometry)
+        FORMAT.rewrite([config.read_text()], geometry)
 
 
 RANGES = "".join(f"[[axes]]\nmin = {-100.0 * (1 + leg)}\nmax = {50.0}\n" for leg in range(6))

@@ -11,7 +11,7 @@ from hexacell.config import write_back as replacement
 from hexacell.config.change import ConfigChange, Receipt, propose
 from hexacell.config.layout import fingerprint
 from hexacell.config.pending_write import is_interrupted, note_write, settle_interrupted_write
-from hexacell.config.toml_format import NativeToml
+from hexacell.config.toml_format import native_layout
 from hexacell.config.write_back import commit, rollback
 from hexacell.errors import FileError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry
@@ -40,7 +40,7 @@ def test_a_commit_writes_what_was_proposed(
     config.chmod(0o640)
     commit(proposal, run)
     assert config.read_bytes() == proposal.text_after.encode()
-    assert NativeToml(HEXAGLIDE_PARAMETERS).read(config).geometry.largest_difference(geometry) <= 5e-7
+    assert native_layout(HEXAGLIDE_PARAMETERS).read(config).geometry.largest_difference(geometry) <= 5e-7
     assert config.stat().st_mode & 0o777 == 0o640
     assert names(config.parent) == [config.name]
 

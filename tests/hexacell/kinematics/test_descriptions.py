@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hexacell.cell.by_mechanism import tolerance_settings
-from hexacell.config.toml_format import NativeToml
+from hexacell.config.toml_format import native_layout
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.parameters import ParameterKind, ParameterSet, ParameterUnit
@@ -72,8 +72,8 @@ def test_a_unit_has_its_own_decimals_and_no_tolerance_by_default(tmp_path: Path)
     config = tmp_path / "robot.toml"
     lines = [f"{symbol} = {values}" for symbol, values in drawn.document().items()]
     config.write_text("\n".join(["[geometry]", *lines, "branch = [1, 1, 1, 1, 1, 1]", ""]))
-    config.write_text(NativeToml(RAILS).rewrite(config.read_text(), built))
-    read = NativeToml(RAILS).read(config).geometry
+    config.write_text(native_layout(RAILS).rewrite([config.read_text()], built)[0])
+    read = native_layout(RAILS).read(config).geometry
     assert read["r"][2, 1] == 1.235e-6
     assert read["l"][0] == 600.123456
     assert tolerance_settings(RAILS).model_fields["r_rad"].is_required()

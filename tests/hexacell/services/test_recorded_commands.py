@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.config.interface import ControllerLimits
-from hexacell.config.toml_format import NativeToml
+from hexacell.config.toml_format import native_layout
 from hexacell.errors import IdentifiabilityError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import FrameTransform
@@ -43,7 +43,9 @@ def cell(tmp_path: Path, paper) -> Cell:
     shutil.copy(source.path, tmp_path)
     text = source.config_path.read_text()
     now = Hexaglide().change_frames(paper.actual, ON_FLOOR.then(TURNED))
-    (tmp_path / source.config_path.name).write_text(NativeToml(HEXAGLIDE_PARAMETERS).rewrite(text, now))
+    (tmp_path / source.config_path.name).write_text(
+        native_layout(HEXAGLIDE_PARAMETERS).rewrite([text], now)[0]
+    )
     return load_cell(tmp_path / source.path.name)
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexacell.config.toml_format import NativeToml
+from hexacell.config.toml_format import native_layout
 from hexacell.errors import DeviceError, ExitCode, HexacellError, Interruption
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
@@ -52,7 +52,7 @@ async def test_a_provisional_geometry_is_closer_to_the_truth_than_the_drawing(ri
     lent: list[Geometry] = []
 
     def look() -> None:
-        lent.append(NativeToml(HEXAGLIDE_PARAMETERS).read(rig.cell.config_path).geometry)
+        lent.append(native_layout(HEXAGLIDE_PARAMETERS).read(rig.cell.config_path).geometry)
         rig.engine.command(Abort())
 
     with pytest.raises(Interruption):

@@ -7,7 +7,7 @@ import tomllib
 import numpy as np
 
 from hexacell.config.change import ConfigChange, Receipt
-from hexacell.config.toml_format import NativeToml
+from hexacell.config.toml_format import native_layout
 from hexacell.errors import ExitCode
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
@@ -33,7 +33,7 @@ def test_a_whole_run_passes(recording) -> None:
 def test_the_written_geometry_agrees_with_the_true_one_within_five_sigma(recording, tmp_path) -> None:
     config = tmp_path / "after.toml"
     config.write_bytes(recording.config_after)
-    written = NativeToml(HEXAGLIDE_PARAMETERS).read(config).geometry
+    written = native_layout(HEXAGLIDE_PARAMETERS).read(config).geometry
     truth = hexaglide_geometry(**tomllib.loads(recording.history[0].cell_text)["simulation"]["geometry"])
     found, expected = (Hexaglide().normalize_frames(geometry)[0].vector for geometry in (written, truth))
     (identified,) = (event for event in recording.history if isinstance(event, events.Identified))
@@ -46,7 +46,7 @@ def test_the_config_has_the_geometry_that_was_proposed_in_frames_near_those_of_b
     """The journal has it, and says how far it moves what was taught."""
     config = tmp_path / "after.toml"
     config.write_bytes(recording.config_after)
-    written = NativeToml(HEXAGLIDE_PARAMETERS).read(config).geometry
+    written = native_layout(HEXAGLIDE_PARAMETERS).read(config).geometry
     state = fold(recording.history)
     assert state.started is not None
     assert state.started.taught == state.started.controller

@@ -15,7 +15,7 @@ from pydantic import TypeAdapter
 
 from docs.raised_messages import GAP, HEADINGS, ROOT, raised_messages
 from hexacell.cell.loader import schema
-from hexacell.cli.parser import make_parser
+from hexacell.cli.arguments import make_parser
 from procedures.steps.events import Event
 
 MARK = re.compile(r"^<!-- made from the program: ([a-z -]+) -->$", flags=re.MULTILINE)

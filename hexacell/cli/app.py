@@ -1,6 +1,7 @@
 """Entry of the command line: runs a command and turns every error into a message and an exit code."""
 
 import argparse
+import logging
 import os
 import shlex
 import sys
@@ -9,10 +10,12 @@ from importlib import import_module
 from pathlib import Path
 
 from hexacell import __version__
+from hexacell.cli.arguments import make_parser
 from hexacell.cli.console import Console, lost_output
-from hexacell.cli.parser import make_parser
-from hexacell.cli.process import fault_line, require_platform, stop_signals_as_sigint
+from hexacell.cli.process import fault_line, log, require_platform, stop_signals_as_sigint
 from hexacell.errors import ExitCode, HexacellError, UsageError
+
+_log = logging.getLogger(__name__)
 
 LOG_FILE = "HEXACELL_LOG_FILE"
 """Variable of the environment with the file of ``--log-file``, for services and for the screen's runs."""
@@ -63,24 +66,19 @@ def _carried_out(options: argparse.Namespace, typed: Sequence[str], console: Con
         module, _, command = options.target.partition(".")
         return int(getattr(import_module(f"hexacell.cli.commands.{module}"), command)(options, console))
 
-    if file is None and not verbosity:  # the usual case needs no module for it
+    if file is None and not verbosity:
         return carry_out()
-    import logging  # noqa: PLC0415 - only where a log is asked for
-
-    from hexacell.cli.log import log  # noqa: PLC0415 - likewise
-
-    logger = logging.getLogger(__name__)
     with log(file, verbosity):
-        logger.info("hexacell %s: %s", __version__, shlex.join(typed))
+        _log.info("hexacell %s: %s", __version__, shlex.join(typed))
         try:
             code = carry_out()
         except HexacellError as error:
-            logger.error("exit code %d: %s", error.exit_code, error)  # noqa: TRY400 - foreseen, no fault
+            _log.error("exit code %d: %s", error.exit_code, error)
             raise
         except BaseException:
-            logger.exception("the command ended without a result")
+            _log.exception("the command ended without a result")
             raise
-        logger.info("exit code %d", code)
+        _log.info("exit code %d", code)
         return code
 
 

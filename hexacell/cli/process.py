@@ -1,9 +1,10 @@
-"""What every command needs of its process: signals, the platform, and reports of faults of the program.
+"""What every command needs of its process: signals, the platform, its log, reports of its faults.
 
 SIGTERM and SIGHUP do what Ctrl-C does. ``docs/howto-host.md`` says what is tested where. Nothing
 slow is imported.
 """
 
+import logging
 import os
 import platform
 import shlex
@@ -11,6 +12,7 @@ import signal
 import socket
 import tempfile
 import threading
+import time
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
@@ -19,7 +21,7 @@ from pathlib import Path
 from types import FrameType
 
 from hexacell import __version__
-from hexacell.errors import UsageError
+from hexacell.errors import FileError, UsageError
 
 STOP_SIGNALS = tuple(
     number for name in ("SIGTERM", "SIGHUP") if (number := getattr(signal, name, None)) is not None
@@ -109,3 +111,43 @@ def require_platform(target: str) -> None:
             "which nobody may reach a run in another process",
             action="Use `hexacell run` at this terminal, or Linux",
         )
+
+
+PACKAGES = ("hexacell", "procedures", "drivers")
+FORMAT = "%(asctime)s.%(msecs)03dZ %(levelname)s %(name)s: %(message)s"
+
+
+@contextmanager
+def log(file: Path | None, verbosity: int) -> Iterator[None]:
+    """Log within this context: to a file, or with ``verbosity`` alone to stderr.
+
+    The log stands beside the journal of a run and replaces no part of it. Every module logs to a logger of
+    its own; ``drivers.wire`` has the bytes on the lines.
+
+    The level is INFO; it is DEBUG, with the bytes on the lines, where both are given or ``verbosity`` is 2.
+
+    Raises:
+        FileError: the file cannot be written.
+    """
+    try:
+        handler = logging.StreamHandler() if file is None else logging.FileHandler(file, encoding="utf-8")
+    except OSError as error:
+        problem = f"the log cannot be written: {error.strerror or error}"
+        raise FileError(problem, subject=file, action="Name another file") from error
+    formatter = logging.Formatter(FORMAT, "%Y-%m-%dT%H:%M:%S")
+    formatter.converter = time.gmtime
+    handler.setFormatter(formatter)
+    level = logging.DEBUG if verbosity + (file is not None) > 1 else logging.INFO
+    shows_errors, logging.raiseExceptions = logging.raiseExceptions, False  # a full disk stops no run
+    loggers = [logging.getLogger(package) for package in PACKAGES]
+    for logger in loggers:
+        logger.addHandler(handler)
+        logger.setLevel(level)
+    try:
+        yield
+    finally:
+        logging.raiseExceptions = shows_errors
+        for logger in loggers:
+            logger.removeHandler(handler)
+            logger.setLevel(logging.NOTSET)
+        handler.close()

@@ -9,7 +9,7 @@ import pytest
 
 from hexacell.cell.bundled import bundled_names
 from hexacell.cli.app import main
-from hexacell.cli.parser import make_parser
+from hexacell.cli.arguments import make_parser
 
 SHELLS = ("bash", "zsh", "fish")
 BASH = """\

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from hexacell.cli.app import main
-from hexacell.cli.parser import make_parser
+from hexacell.cli.arguments import make_parser
 from tests.cli.test_completion import commands_of
 
 SLOW_TO_IMPORT = {"numpy", "scipy", "textual", "matplotlib", "pydantic", "rich", "asyncio"}

@@ -74,7 +74,7 @@ def test_what_happens_while_it_is_told_leaves_the_exit_code(
     def fail(*_: object) -> None:
         raise raised
 
-    monkeypatch.setattr("hexacell.cli.unattended.notify_all", fail)
+    monkeypatch.setattr("hexacell.cli.commands.unattended.notify_all", fail)
     tell(quick_cell, "hall", "http://127.0.0.1:1/")
     with cell_lock(quick_cell.controller):
         outcome = typed_here("run", quick_cell.cell, *CHECK)

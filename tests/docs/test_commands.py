@@ -5,7 +5,7 @@ import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
-from hexacell.cli.parser import make_parser
+from hexacell.cli.arguments import make_parser
 from hexacell.errors import UsageError
 
 ROOT = Path(__file__).parents[2]

@@ -6,7 +6,7 @@ from docs import generated
 from docs.raised_messages import raised_messages
 from hexacell.cell.devices import GaugeAxis
 from hexacell.cell.loader import schema
-from hexacell.cli.parser import make_parser
+from hexacell.cli.arguments import make_parser
 
 DOCS = Path(__file__).parents[2] / "docs"
 

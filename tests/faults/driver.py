@@ -23,7 +23,7 @@ import can.interfaces.virtual
 import scipy.stats
 
 import hexacell.cli.commands.run
-import hexacell.cli.commands.simulate
+import hexacell.cli.commands.serve
 from drivers.simulated import cell as simulated_cell
 from drivers.simulated import robot
 from hexacell.cli.app import main
@@ -38,7 +38,7 @@ UNEXPECTED = 70
 """The exit code for an error that the program did not expect."""
 
 LOADED: tuple[object, ...] = (can.interfaces.virtual, pwd, scipy.stats, simulated_cell)
-LOADED += (hexacell.cli.commands.run, hexacell.cli.commands.simulate)
+LOADED += (hexacell.cli.commands.run, hexacell.cli.commands.serve)
 """What the program would import on its way; here once for all its processes."""
 
 

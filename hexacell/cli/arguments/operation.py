@@ -84,7 +84,10 @@ def _devices(commands: Any) -> None:  # noqa: ANN401
 
 def _schedule(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(
-        commands, "schedule", "have a cell checked each day: systemd units or a crontab line"
+        commands,
+        "schedule",
+        "have a cell checked each day: systemd units or a crontab line",
+        "unattended.schedule",
     )
     add_cell(parser)
     what = parser.add_mutually_exclusive_group()
@@ -114,7 +117,9 @@ def _status(commands: Any) -> None:  # noqa: ANN401
 
 
 def _notify(commands: Any) -> None:  # noqa: ANN401
-    parser = add_command(commands, "notify", "who hears of unattended runs: list, try, send what waits")
+    parser = add_command(
+        commands, "notify", "who hears of unattended runs: list, try, send what waits", "unattended.notify"
+    )
     add_cell(parser)
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--test", action="store_true", help="notify everybody of a test now")
@@ -123,7 +128,9 @@ def _notify(commands: Any) -> None:  # noqa: ANN401
 
 
 def _serve(commands: Any) -> None:  # noqa: ANN401
-    parser = add_command(commands, "serve", "serve the results of a cell by OPC UA until interrupted")
+    parser = add_command(
+        commands, "serve", "serve the results of a cell by OPC UA until interrupted", "serve.results"
+    )
     add_cell(parser)
 
 
@@ -216,7 +223,9 @@ def _history(commands: Any) -> None:  # noqa: ANN401
 
 
 def _report(commands: Any) -> None:  # noqa: ANN401
-    parser = add_command(commands, "report", "write the report of a run: one file to read, print and file")
+    parser = add_command(
+        commands, "report", "write the report of a run: one file to read, print and file", "recorded.report"
+    )
     add_run(parser)
     add_file(
         parser,

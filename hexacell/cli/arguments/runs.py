@@ -95,7 +95,10 @@ def _preflight(commands: Any) -> None:  # noqa: ANN401
 
 def _simulate(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(
-        commands, "simulate", "serve a simulated cell to other processes until interrupted"
+        commands,
+        "simulate",
+        "serve a simulated cell to other processes until interrupted",
+        "serve.simulate",
     )
     add_cell(parser)
     add_file(parser, "--output", "write the cell file for `run` there instead of to stdout")
@@ -146,7 +149,12 @@ def _fit(commands: Any) -> None:  # noqa: ANN401
 
 
 def _replay(commands: Any) -> None:  # noqa: ANN401
-    parser = add_command(commands, "replay", "repeat a recorded run's decisions and results, and compare")
+    parser = add_command(
+        commands,
+        "replay",
+        "repeat a recorded run's decisions and results, and compare",
+        "recorded.replay_run",
+    )
     add_run(parser, "a run folder, or a journal")
     parser.add_argument(
         "--only",

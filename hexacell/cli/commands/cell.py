@@ -1,13 +1,19 @@
-"""``hexacell cell validate|schema|show``: checks or prints a cell file."""
+"""``hexacell cell validate|schema|show``, and the cell that any other command is given.
+
+Warnings about a cell go to stderr.
+"""
 
 import argparse
 import json
+from pathlib import Path
 
-from hexacell.cell.loader import describe, require_plugins, schema, settings_document
-from hexacell.cell.passwords import with_passwords
-from hexacell.cli.cell_argument import cell_at, cell_with_devices_at
+from hexacell.cell.loader import Cell, describe, load_cell, require_plugins, schema, settings_document
+from hexacell.cell.operation import mistake_in_url
+from hexacell.cell.passwords import password_warnings, with_passwords
 from hexacell.cli.console import Console
-from hexacell.errors import ExitCode
+from hexacell.config.pending_write import settle_config
+from hexacell.errors import ExitCode, UsageError
+from hexacell.services.preflight import certificate_warnings, exposure_warnings, telling_warnings
 from hexacell.text.config_changes import files_named
 
 
@@ -34,3 +40,29 @@ def main(options: argparse.Namespace, console: Console) -> ExitCode:
     config = files_named(cell.config_paths)
     console.print(f"{options.cell}: valid, and so is its controller config {config}")
     return ExitCode.DONE
+
+
+def cell_at(path: Path, console: Console) -> Cell:
+    """The cell; raises ``FileError`` or ``SeveralErrors`` as ``load_cell`` does."""
+    cell = load_cell(path)
+    for warning in (*password_warnings(cell), *telling_warnings(cell)):
+        console.warn(warning)
+    if (settled := settle_config(*cell.config_paths)) is not None:
+        console.warn(settled)
+    return cell
+
+
+def cell_with_devices_at(path: Path, console: Console) -> Cell:
+    """The cell for a command that is about its devices, with warnings about them too."""
+    cell = cell_at(path, console)
+    for warning in (*exposure_warnings(cell), *certificate_warnings(cell)):
+        console.warn(warning)
+    return cell
+
+
+def archive_url(url: str) -> str:
+    """The address of an archive that cells share, if it is one; raises ``UsageError``."""
+    mistake = mistake_in_url(url)
+    if mistake is not None:
+        raise UsageError(mistake[0], subject="--archive", action=mistake[1])
+    return url

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 import shtab
 
 from hexacell.cell.bundled import bundled_names
+from hexacell.cli.arguments import make_parser
 from hexacell.cli.console import Console
-from hexacell.cli.parser import make_parser
 from hexacell.errors import ExitCode
 
 FOLDER, FILE = shtab.DIRECTORY, shtab.FILE

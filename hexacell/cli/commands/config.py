@@ -5,7 +5,7 @@ import asyncio
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from hexacell.cli.cell_argument import cell_at
+from hexacell.cli.commands.cell import cell_at
 from hexacell.cli.console import Console
 from hexacell.cli.terminal import TerminalOperator, is_interactive
 from hexacell.config.pending_write import settle_config

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from drivers.discovery.encoders import set_node_id
-from hexacell.cli.cell_argument import cell_at
+from hexacell.cli.commands.cell import cell_at
 from hexacell.cli.console import Console
 from hexacell.cli.terminal import is_interactive
 from hexacell.errors import AnswerNeeded, ExitCode, FileError, UsageError

@@ -3,7 +3,7 @@
 import argparse
 
 from hexacell.cell.loader import Cell
-from hexacell.cli.cell_argument import archive_url, cell_at
+from hexacell.cli.commands.cell import archive_url, cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
 from hexacell.runs.run_folder import RunFolder, find_run

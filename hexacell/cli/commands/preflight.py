@@ -4,7 +4,7 @@ import argparse
 import asyncio
 
 from drivers.errors import BusError, ConnectionLost, GaugeSilent, PortLost, SilentNodeError, WrongAnswer
-from hexacell.cli.cell_argument import cell_with_devices_at
+from hexacell.cli.commands.cell import cell_with_devices_at
 from hexacell.cli.console import Console
 from hexacell.dry_run.quick_level import try_quick_level
 from hexacell.errors import ExitCode, HexacellError, flatten_errors

@@ -2,7 +2,7 @@
 
 import argparse
 
-from hexacell.cli.cell_argument import cell_at
+from hexacell.cli.commands.cell import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode
 from hexacell.identification.identified_zeros import ParameterChoice

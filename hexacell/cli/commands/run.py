@@ -8,11 +8,11 @@ from dataclasses import replace
 
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
-from hexacell.cli.cell_argument import cell_with_devices_at
+from hexacell.cli.commands.cell import cell_with_devices_at
+from hexacell.cli.commands.unattended import begun_in_window, notified_afterwards
 from hexacell.cli.console import Console
 from hexacell.cli.progress import RunAnswers, RunProgress
 from hexacell.cli.terminal import KeyboardCommands, SignalCommands, TerminalOperator, is_interactive
-from hexacell.cli.unattended import begun_in_window, notified_afterwards
 from hexacell.errors import ExitCode, HexacellError, UsageError
 from hexacell.run_process.live_devices import RunDeviceWatch
 from hexacell.runs.run_folder import new_run

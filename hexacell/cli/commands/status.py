@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from hexacell.cell.loader import is_cell_file
-from hexacell.cli.cell_argument import archive_url, cell_at
+from hexacell.cli.commands.cell import archive_url, cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, FileError, HexacellError, UsageError
 from hexacell.services.history.cell_status import (

@@ -10,7 +10,7 @@ from hexacell.campaign.decisions import Forecast
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.cell.recovery import Action, FailureKind
-from hexacell.cli.parser import make_parser
+from hexacell.cli.arguments import make_parser
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.run_process.messages import EncoderSnapshot, GaugeSnapshot, LiveSnapshot
 from hexacell.runs.run_folder import RunFolder

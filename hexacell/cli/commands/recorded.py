@@ -1,0 +1,76 @@
+"""``hexacell replay`` and ``report``: a recorded run repeated, or as a page that can be filed."""
+
+import argparse
+import asyncio
+from pathlib import Path
+
+from hexacell.cli.console import Console
+from hexacell.errors import ExitCode, UsageError
+from hexacell.services.history.reported_run import ReportedRun, reported_run
+from hexacell.services.history.run_export import export_run
+from hexacell.services.run.replay_run import replay
+from hexacell.storage.atomic_files import write_atomically
+from hexacell.text import certificate
+from hexacell.text.documents import replay_document
+from hexacell.text.report.pages import Report, html_of, pdf_of
+from hexacell.text.report.report import report_of
+from hexacell.text.run import replay_report
+from procedures.replay.recorded_executor import TOLERANCE
+from procedures.replay.replayer import Scope
+
+CERTIFICATE = ".xml"
+"""How the name of a file ends that is to be one."""
+
+KINDS = (".html", ".htm", ".pdf", CERTIFICATE)
+
+
+def replay_run(options: argparse.Namespace, console: Console) -> ExitCode:
+    """Replay, and report what differs from the recording; or export the run, and replay nothing."""
+    if options.export is not None:
+        names = export_run(options.run, options.export)
+        console.show(
+            {"exported": str(options.export), "files": list(names)},
+            f"{options.export}: {len(names)} files of the run, every password masked",
+        )
+        return ExitCode.DONE
+    tolerance = TOLERANCE if options.tolerance is None else options.tolerance
+    if not 0.0 <= tolerance < float("inf"):
+        raise UsageError(f"--tolerance {tolerance:g} is not a tolerance", action="Give a number from 0")
+    replayed = asyncio.run(replay(options.run, Scope(options.only or "all"), tolerance))
+    console.show(replay_document(replayed), replay_report(replayed))
+    return ExitCode.DONE if replayed.is_same else ExitCode.OUT_OF_LIMITS
+
+
+def report(options: argparse.Namespace, console: Console) -> ExitCode:
+    """Write the report; the run folder is only read, unless the report goes into it."""
+    target = options.output or options.run / "report.html"
+    _require_possible(target, is_comparison=options.compare is not None)
+    earlier = None if options.compare is None else reported_run(options.compare)
+    run = reported_run(options.run)
+    made = report_of(run, earlier)
+    write_atomically(target, _written(target.suffix, run, made))
+    console.document({"report": str(target), "identifier": made.identifier, "verdict": made.verdict})
+    title = certificate.TITLE if target.suffix == CERTIFICATE else made.title.lower()
+    console.print(f"{target}: {title}, {made.verdict}")
+    return ExitCode.DONE
+
+
+def _require_possible(target: Path, *, is_comparison: bool) -> None:
+    if target.suffix not in KINDS:
+        action = "Name one that ends in .html, .pdf or .xml"
+        raise UsageError("reports of this kind are not made", subject=target, action=action)
+    if is_comparison and target.suffix == CERTIFICATE:
+        raise UsageError(
+            "a certificate compares nothing",
+            action="Leave --compare away, or name a file that ends in .pdf",
+        )
+
+
+def _written(suffix: str, run: ReportedRun, made: Report) -> bytes:
+    match suffix:
+        case ".pdf":
+            return pdf_of(made)
+        case ".xml":
+            return certificate.certificate_of_run(run)
+        case _:
+            return html_of(made).encode()

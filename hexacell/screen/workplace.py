@@ -17,11 +17,11 @@ from hexacell.run_process.run_socket import socket_path
 from hexacell.runs.run_folder import find_run, new_run
 from hexacell.screen.child import Preflight, TriedPlan, run_child
 from hexacell.screen.preferences import RESUME, WITH_LENGTH
+from hexacell.services.history.journal_soundness import read_sound
 from hexacell.services.history.past_runs import compare_runs, parameter_trends, past_runs
+from hexacell.services.history.resumption import LATEST, run_to_resume
 from hexacell.services.history.run_index import PastRun
 from hexacell.services.preflight import exposure_warnings, toggle_exclusion
-from hexacell.services.recorded.journal_soundness import read_sound
-from hexacell.services.recorded.resumption import LATEST, run_to_resume
 from hexacell.services.write_back.config_rollback import roll_back_config
 from hexacell.services.write_back.proposals import apply_proposal, approval_question, read_proposal
 from hexacell.text.config_changes import applied_text, rollback_text

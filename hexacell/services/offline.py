@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from hexacell import services
 from hexacell.campaign import decisions, feasibility
 from hexacell.campaign.feasibility import unreachable_share
 from hexacell.campaign.planner import Plan
@@ -16,7 +17,6 @@ from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.measurements.records import MeasurementSet, RecordId
 from hexacell.robot.model import robot_of
 from hexacell.runs.run_folder import RunFolder
-from hexacell.services import search_effort
 from hexacell.services.design_facts import StatedPose, require_design, stated_poses
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def fit_measurements(
     robot, settings, measured = robot_of(cell), cell.settings, None
     if folder is not None and folder.journal.is_file():
         from hexacell.noise.measured_noise import with_measured_noise  # noqa: PLC0415 - only for a run
-        from hexacell.services.recorded.recorded_robot import commanding_geometries, noise_of_run  # noqa: PLC0415 - likewise
+        from hexacell.services.history.recorded_cell import commanding_geometries, noise_of_run  # noqa: PLC0415 - likewise
 
         recorded = commanding_geometries(folder, cell.settings)
         robot = replace(robot, earlier=(*recorded, *robot.earlier))
@@ -153,7 +153,7 @@ def try_plan(cell: Cell) -> PlanTrial:
 
 def plan_of(cell: Cell) -> Plan:
     """The plan of a cell; raises ``FileError`` if its config or its list of poses cannot be read."""
-    return Plan(cell.settings, robot_of(cell), pose_list_of(cell), search_effort.EFFORT)
+    return Plan(cell.settings, robot_of(cell), pose_list_of(cell), services.EFFORT)
 
 
 def _state_of_records(plan: Plan, measurements: MeasurementSet, rejections: int) -> decisions.CampaignState:

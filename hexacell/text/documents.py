@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     from hexacell.dry_run.quick_level import QuickTrial
     from hexacell.results.run_comparison import ParameterTrend, RunComparison
     from hexacell.services.history.drift_history import DriftHistory, FoundChange
-    from hexacell.services.history.retention import Retention
+    from hexacell.services.history.past_runs import Retention
     from hexacell.services.history.run_index import PastRun, RunSummary
     from hexacell.services.offline import NextPose, PlanTrial
     from hexacell.services.run.calibration_run import RunRequest
-    from hexacell.services.schedule.schedules import Schedule
+    from hexacell.services.unattended.schedules import Schedule
     from hexacell.services.write_back.config_history import ConfigHistory, ConfigWrite
     from hexacell.services.write_back.config_rollback import ConfigRollback
     from hexacell.services.write_back.proposals import AppliedProposal

@@ -12,7 +12,7 @@ from hexacell.text.layout import change_with_sigma, error_with_u, verdict_word, 
 if TYPE_CHECKING:
     from hexacell.results.run_comparison import ParameterTrend, RunComparison
     from hexacell.services.history.drift_history import DriftHistory, FoundChange
-    from hexacell.services.history.retention import Retention
+    from hexacell.services.history.past_runs import Retention
 
 NO_RUNS = "This cell has no runs yet."
 NO_DRIFT = "A drift needs three calibrations of the cell."

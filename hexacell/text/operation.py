@@ -9,10 +9,10 @@ from hexacell.cell.operation import NotificationSettings, UnattendedSettings, sc
 from hexacell.text.layout import wrapped
 
 if TYPE_CHECKING:
-    from hexacell.services.notify.notice import PendingNotice
-    from hexacell.services.notify.outbox import NotifyOutcome
-    from hexacell.services.schedule.scheduled_run import ScheduledRun
-    from hexacell.services.schedule.schedules import Schedule
+    from hexacell.services.unattended.notice import PendingNotice
+    from hexacell.services.unattended.outbox import NotifyOutcome
+    from hexacell.services.unattended.scheduled_run import ScheduledRun
+    from hexacell.services.unattended.schedules import Schedule
 
 NOBODY = "nobody is notified; write [[notifications]] in the cell file"
 NEXT_TIME = "sent at the next run, or by hexacell notify CELL --send"

@@ -108,7 +108,7 @@ def _with_decimals(rows: Iterable[ParameterRow]) -> tuple[ParameterRow, ...]:
 
 def rows_of_run(state: RunState, settings: CellSettings | None) -> tuple[ParameterRow, ...]:
     """What a run identified, or what a check found to have changed; empty where nothing is known yet."""
-    from hexacell.services.recorded.recorded_robot import geometry_before  # noqa: PLC0415 - only for runs
+    from hexacell.services.history.recorded_cell import geometry_before  # noqa: PLC0415 - only for runs
 
     if state.judged is not None and state.judged.check is not None:
         return rows_of_changes(state.judged.check.changes)

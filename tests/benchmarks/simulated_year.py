@@ -30,7 +30,7 @@ from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.history.drift_history import drift_history
 from hexacell.services.history.past_runs import past_runs
 from hexacell.services.run.calibration_run import new_calibration
-from hexacell.services.schedule import unattended_runs
+from hexacell.services.unattended import unattended_runs
 from hexacell.verdict.decision import Verdict
 from procedures.calibration.calibration import Calibration, Mode
 from procedures.journal import journal as line_format

@@ -41,8 +41,8 @@ WITH_LITTLE_EFFORT = """
 import sys
 from hexacell.__main__ import main
 from hexacell.design.search_effort import SearchEffort
-from hexacell.services import search_effort
-search_effort.EFFORT = SearchEffort(
+from hexacell import services
+services.EFFORT = SearchEffort(
     candidates=64,
     held_out_candidates=128,
     checked_candidates=8,

@@ -15,7 +15,7 @@ TOKEN = "hidden-token-7"
 def reached_at_once(monkeypatch):
     """Servers on loopback, and again at once where they refuse."""
     monkeypatch.setenv("no_proxy", "127.0.0.1")
-    monkeypatch.setattr("hexacell.services.notify.delivery.PAUSES_S", (0.0, 0.0))
+    monkeypatch.setattr("hexacell.services.unattended.delivery.PAUSES_S", (0.0, 0.0))
 
 
 def tell(folder, name: str, url: str, *lines: str) -> None:

@@ -9,8 +9,13 @@ from hexacell.errors import ExitCode, UsageError
 from hexacell.runs.run_folder import RunFolder, find_run
 from hexacell.services.history.cell_status import fleet_runs
 from hexacell.services.history.drift_history import drift_history
-from hexacell.services.history.past_runs import compare_runs, parameter_trends, past_runs
-from hexacell.services.history.retention import delete_runs, retention
+from hexacell.services.history.past_runs import (
+    compare_runs,
+    delete_runs,
+    parameter_trends,
+    past_runs,
+    retention,
+)
 from hexacell.services.history.run_index import RunIndex
 from hexacell.services.write_back.config_history import config_history
 from hexacell.text import documents

@@ -16,12 +16,12 @@ from hexacell.cli.terminal import KeyboardCommands, SignalCommands, TerminalOper
 from hexacell.errors import ExitCode, HexacellError, UsageError
 from hexacell.run_process.live_devices import RunDeviceWatch
 from hexacell.runs.run_folder import new_run
-from hexacell.services.notify.notice import RunEnd
-from hexacell.services.recorded.resumption import run_to_resume
+from hexacell.services.history.resumption import run_to_resume
 from hexacell.services.run.calibration_run import RunRequest, calibrate, is_unverified
 from hexacell.services.run.demo import prepare_demo
 from hexacell.services.run.event_stream import EventStream
-from hexacell.services.schedule import unattended_runs
+from hexacell.services.unattended import unattended_runs
+from hexacell.services.unattended.notice import RunEnd
 from hexacell.text.documents import run_document
 from hexacell.text.layout import wrapped
 from hexacell.text.line_face import LETTERS

@@ -10,17 +10,17 @@ from hexacell.cli.console import Console
 from hexacell.cli.terminal import SignalCommands
 from hexacell.errors import ExitCode, FileError, HexacellError, UsageError
 from hexacell.services.history.cell_status import cell_status, publish_status
-from hexacell.services.notify.notice import RunEnd, notice_of_end, notice_of_failure, notice_of_test
-from hexacell.services.notify.outbox import notify_all, notify_test, send_waiting, waiting_notices
 from hexacell.services.run.calibration_run import RunRequest
-from hexacell.services.schedule.scheduled_run import crontab_line
-from hexacell.services.schedule.schedules import (
+from hexacell.services.unattended.notice import RunEnd, notice_of_end, notice_of_failure, notice_of_test
+from hexacell.services.unattended.outbox import notify_all, notify_test, send_waiting, waiting_notices
+from hexacell.services.unattended.scheduled_run import crontab_line
+from hexacell.services.unattended.schedules import (
     present_schedule,
     remove_schedule,
     scheduled_run,
     write_schedule,
 )
-from hexacell.services.schedule.unattended_runs import local_now, refuse_quiet_hours, refused_start
+from hexacell.services.unattended.unattended_runs import local_now, refuse_quiet_hours, refused_start
 from hexacell.text import operation
 from hexacell.text.documents import schedule_document
 from hexacell.text.run import next_try_text

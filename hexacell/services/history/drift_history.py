@@ -129,7 +129,7 @@ def _counted_runs(cell: Cell, index: RunIndex) -> list[EvidenceDocument]:
     settings = cell.settings
 
     def read(folder: RunFolder) -> EvidenceDocument | None:
-        from hexacell.services.history.run_evidence_document import evidence_document  # noqa: PLC0415
+        from hexacell.services.history.run_summary import evidence_document  # noqa: PLC0415
 
         return evidence_document(settings, folder)
 

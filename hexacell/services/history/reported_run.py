@@ -13,8 +13,8 @@ from hexacell.config.change import AFTER, BEFORE
 from hexacell.errors import FileError, UsageError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.runs.run_folder import CELL_FILE, JOURNAL, MEASUREMENTS, RESULT, RunFolder
-from hexacell.services.recorded.journal_soundness import read_sound
-from hexacell.services.recorded.recorded_robot import geometry_before
+from hexacell.services.history.journal_soundness import read_sound
+from hexacell.services.history.recorded_cell import geometry_before
 from hexacell.storage import atomic_files
 from procedures.run.state import RunState
 from procedures.steps import events

@@ -12,9 +12,9 @@ from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.results.result import AcceptedResult, LengthResult
 from hexacell.runs.run_folder import RunFolder, run_folders
+from hexacell.services.history.journal_soundness import read_sound
+from hexacell.services.history.recorded_cell import started_robot
 from hexacell.services.history.run_summary import judged_accuracy
-from hexacell.services.recorded.journal_soundness import read_sound
-from hexacell.services.recorded.recorded_robot import started_robot
 from hexacell.services.write_back.proposals import later_approval
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.length_check import with_measured_scale

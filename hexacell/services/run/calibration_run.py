@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from drivers.interfaces import DeviceIdentity
-from hexacell import __version__
+from hexacell import __version__, services
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
 from hexacell.config.layout import CurrentConfig, fingerprint
@@ -15,14 +15,12 @@ from hexacell.config.pending_write import held_config
 from hexacell.errors import FileError, HexacellError, UsageError, flatten_errors
 from hexacell.robot.model import config_layout, controller_geometry, robot_of
 from hexacell.runs.run_folder import RunFolder, runs_folder
-from hexacell.services import search_effort
 from hexacell.services.design_facts import require_design
-from hexacell.services.devices.changed_devices import with_changes
 from hexacell.services.devices.device_setup import Connected, device_addresses, open_devices
+from hexacell.services.history.journal_soundness import require_sound
+from hexacell.services.history.recorded_cell import started_robot, with_changes
+from hexacell.services.history.resumption import require_own_run
 from hexacell.services.history.run_summary import state_of
-from hexacell.services.recorded.journal_soundness import require_sound
-from hexacell.services.recorded.recorded_robot import started_robot
-from hexacell.services.recorded.resumption import require_own_run
 from hexacell.services.run.accepted_results import last_accepted_result
 from hexacell.services.write_back.config_rollback import require_no_provisional
 from hexacell.storage.atomic_files import read_text, remove_stale_temporaries, write_atomically
@@ -267,7 +265,7 @@ def calibration_of_run(cell: Cell, started: events.RunStarted) -> Calibration:
         pose_list_of(cell),
         started.accepted,
         length_check=started.length_check,
-        effort=search_effort.EFFORT,
+        effort=services.EFFORT,
     )
 
 
@@ -296,5 +294,5 @@ def new_calibration(cell: Cell, mode: Mode, *, length_check: bool = False) -> Ca
         pose_list_of(cell),
         accepted,
         length_check=length_check,
-        effort=search_effort.EFFORT,
+        effort=services.EFFORT,
     )

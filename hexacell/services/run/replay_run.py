@@ -14,7 +14,7 @@ from hexacell.config.change import BEFORE, ConfigChange, kept_paths
 from hexacell.config.layout import Contents, fingerprint_of, read_contents_if_present
 from hexacell.errors import FileError, HexacellError
 from hexacell.runs.run_folder import CELL_FILE, RunFolder
-from hexacell.services.recorded.journal_soundness import require_sound
+from hexacell.services.history.journal_soundness import require_sound
 from hexacell.services.run.calibration_run import calibration_of_run
 from procedures.journal.journal import RESTORE, Entry, read_entries
 from procedures.replay.recorded_executor import TOLERANCE, RecordedStepExecutor

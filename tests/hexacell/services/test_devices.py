@@ -9,8 +9,8 @@ from drivers.serial.shared_port import SharedSerialPorts
 from drivers.wire_trace import WireTrace
 from hexacell.errors import DeviceError
 from hexacell.runs.run_folder import RunFolder, runs_folder
-from hexacell.services.devices.changed_devices import with_changes
 from hexacell.services.devices.device_setup import device_addresses, devices_of, open_devices
+from hexacell.services.history.recorded_cell import with_changes
 from hexacell.services.run.calibration_run import new_calibration, preflight, run_started
 from procedures.calibration.calibration import Mode
 from procedures.journal.journal import Journal

@@ -7,10 +7,10 @@ import pytest
 
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.runs.run_folder import RunFolder
-from hexacell.services.history import run_evidence_document
+from hexacell.services.history import run_summary
 from hexacell.services.history.drift_history import DriftHistory, drift_history
-from hexacell.services.history.run_evidence_document import evidence_document
 from hexacell.services.history.run_index import EvidenceDocument
+from hexacell.services.history.run_summary import evidence_document
 from hexacell.text.history import change_sentence, watch_text
 from tests.hexacell.services.proposed_runs import a_cell
 from tests.hexacell.services.recorded_nights import Nights
@@ -78,7 +78,7 @@ def test_each_run_is_computed_once_for_what_the_cell_file_states(nights, monkeyp
         computed.append(folder.path.name)
         return evidence_document(settings, folder)
 
-    monkeypatch.setattr(run_evidence_document, "evidence_document", noted)
+    monkeypatch.setattr(run_summary, "evidence_document", noted)
     after(nights, 2, crash={})
     assert len(computed) == 3
     nights.check()

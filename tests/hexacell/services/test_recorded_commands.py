@@ -19,8 +19,8 @@ from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexag
 from hexacell.measurements.records import MeasurementSet
 from hexacell.noise.measured_noise import InstrumentNoise, MeasuredNoise
 from hexacell.runs.run_folder import RunFolder
+from hexacell.services.history.recorded_cell import commanding_geometries, noise_of_run
 from hexacell.services.offline import fit_measurements
-from hexacell.services.recorded.recorded_robot import commanding_geometries, noise_of_run
 from hexacell.text.identification import identification_report
 from procedures.journal.journal import Journal
 from procedures.run.keys import Phase, SetKey

@@ -10,8 +10,7 @@ from hexacell.config.write_back import commit
 from hexacell.errors import CellBusy
 from hexacell.runs.cell_lock import cell_lock
 from hexacell.runs.run_folder import RunFolder, runs_folder
-from hexacell.services.history.past_runs import past_runs
-from hexacell.services.history.retention import LEAVING, KeptFor, delete_runs, retention
+from hexacell.services.history.past_runs import LEAVING, KeptFor, delete_runs, past_runs, retention
 from hexacell.text.history import retention_text
 from procedures.journal.journal import Entry, encode, read_journal
 from tests.hexacell.services.proposed_runs import a_cell, propose_run

@@ -19,10 +19,9 @@ from hexacell.errors import (
 )
 from hexacell.measurements.csv_file import read_measurements
 from hexacell.runs.run_folder import RunFolder, find_run, read_attempts, runs_folder
-from hexacell.services.history.past_runs import past_runs
-from hexacell.services.history.retention import reason_to_keep
+from hexacell.services.history.past_runs import past_runs, reason_to_keep
 from hexacell.services.run.calibration_run import RunRequest, calibrate
-from hexacell.services.schedule.unattended_runs import (
+from hexacell.services.unattended.unattended_runs import (
     ended_in_time,
     refuse_quiet_hours,
     refused_start,
@@ -83,7 +82,7 @@ def test_a_disk_that_takes_no_note_changes_nothing_else(refused, monkeypatch) ->
     def full(*_: object) -> None:
         raise FileError("no space left on device")
 
-    monkeypatch.setattr("hexacell.services.schedule.unattended_runs.note_attempt", full)
+    monkeypatch.setattr("hexacell.services.unattended.unattended_runs.note_attempt", full)
     assert refused() == 1200.0
 
 

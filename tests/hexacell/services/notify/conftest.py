@@ -10,4 +10,4 @@ def no_proxy(monkeypatch):
 
 @pytest.fixture(autouse=True)
 def no_pauses(monkeypatch):
-    monkeypatch.setattr("hexacell.services.notify.delivery.PAUSES_S", (0.0, 0.0))
+    monkeypatch.setattr("hexacell.services.unattended.delivery.PAUSES_S", (0.0, 0.0))

@@ -4,8 +4,8 @@ from datetime import UTC, datetime
 from typing import Any
 
 from hexacell.cell.operation import Occasion
-from hexacell.services.notify.delivery import NoticeAddress
-from hexacell.services.notify.notice import Notice
+from hexacell.services.unattended.delivery import NoticeAddress
+from hexacell.services.unattended.notice import Notice
 
 
 def a_notice(number: int = 1, **further: Any) -> Notice:

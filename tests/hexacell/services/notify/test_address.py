@@ -7,7 +7,7 @@ import pytest
 
 from hexacell.cell.operation import NotificationSettings
 from hexacell.errors import FileError, UsageError
-from hexacell.services.notify.delivery import NoticeAddress, resolved_address, variable
+from hexacell.services.unattended.delivery import NoticeAddress, resolved_address, variable
 
 CHAT = "slack://hidden-a/hidden-b/hidden-c/#general?footer=hidden-d"
 

@@ -8,8 +8,8 @@ from unittest.mock import MagicMock
 
 import pytest
 
-from hexacell.services.notify.delivery import deliver
-from hexacell.services.notify.notice import NoticeUndelivered
+from hexacell.services.unattended.delivery import deliver
+from hexacell.services.unattended.notice import NoticeUndelivered
 from tests.hexacell.services.notify.local_servers import closed_port, webhook
 from tests.hexacell.services.notify.notices import a_notice, an_address
 

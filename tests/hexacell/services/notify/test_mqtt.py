@@ -3,8 +3,8 @@
 import pytest
 
 from hexacell.cell.operation import Occasion
-from hexacell.services.notify.delivery import deliver
-from hexacell.services.notify.notice import Notice, NoticeUndelivered
+from hexacell.services.unattended.delivery import deliver
+from hexacell.services.unattended.notice import Notice, NoticeUndelivered
 from tests.hexacell.services.notify.local_servers import broker, make_certificate
 from tests.hexacell.services.notify.notices import a_notice, an_address
 

@@ -14,9 +14,9 @@ from hexacell.cell.loader import Cell
 from hexacell.cell.operation import NotificationSettings, Occasion
 from hexacell.errors import FileError
 from hexacell.runs.run_folder import runs_folder
-from hexacell.services.notify.delivery import NoticeAddress
-from hexacell.services.notify.notice import Notice, NoticeUndelivered
-from hexacell.services.notify.outbox import (
+from hexacell.services.unattended.delivery import NoticeAddress
+from hexacell.services.unattended.notice import Notice, NoticeUndelivered
+from hexacell.services.unattended.outbox import (
     NoticeOutbox,
     notify_all,
     notify_test,
@@ -120,7 +120,7 @@ def test_who_is_slow_is_waited_for_only_so_long_and_delays_nobody(tmp_path, post
         else:
             post(address, notice)
 
-    monkeypatch.setattr("hexacell.services.notify.outbox.LONGEST_NOTIFYING_S", 0.2)
+    monkeypatch.setattr("hexacell.services.unattended.outbox.LONGEST_NOTIFYING_S", 0.2)
     problems = {one.name: one.problem for one in notify_all(cell, now_notice(1), slow).deliveries}
     assert problems == {"one": "not finished within 0.2 s", "two": None}
     assert [one.to for one in waiting_notices(cell)] == ["one"]

@@ -4,8 +4,8 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from hexacell.services.notify.notice import PendingNotice
-from hexacell.services.notify.outbox import FOLDER, LONGEST_KEPT, MOST_KEPT, NoticeOutbox
+from hexacell.services.unattended.notice import PendingNotice
+from hexacell.services.unattended.outbox import FOLDER, LONGEST_KEPT, MOST_KEPT, NoticeOutbox
 from tests.hexacell.services.notify.notices import a_notice
 
 BEGIN = datetime(2026, 11, 1, tzinfo=UTC)

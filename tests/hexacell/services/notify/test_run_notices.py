@@ -7,9 +7,9 @@ from hexacell.cell.operation import Occasion
 from hexacell.errors import AnswerNeeded, CellBusy, DeviceError, SeveralErrors
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services.history.past_runs import past_runs
-from hexacell.services.notify import notice as run_notices
-from hexacell.services.notify.notice import RunEnd, notice_of_end, notice_of_failure
 from hexacell.services.run.calibration_run import RunRequest
+from hexacell.services.unattended import notice as run_notices
+from hexacell.services.unattended.notice import RunEnd, notice_of_end, notice_of_failure
 from hexacell.verdict.decision import Verdict
 from procedures.calibration.calibration import Mode
 from procedures.engine.commands import UnattendedOperator

@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from hexacell.services.notify import delivery
-from hexacell.services.notify.delivery import PAUSES_S, deliver
-from hexacell.services.notify.notice import Notice, NoticeUndelivered
+from hexacell.services.unattended import delivery
+from hexacell.services.unattended.delivery import PAUSES_S, deliver
+from hexacell.services.unattended.notice import Notice, NoticeUndelivered
 from tests.hexacell.services.notify.local_servers import (
     closed_port,
     make_certificate,

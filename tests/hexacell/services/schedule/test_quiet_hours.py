@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from hexacell.cell.operation import UnattendedSettings
-from hexacell.services.schedule.unattended_runs import next_quiet, quiet_until
+from hexacell.services.unattended.unattended_runs import next_quiet, quiet_until
 
 MONDAY = datetime(2026, 3, 2, tzinfo=UTC)
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hexacell.errors import UsageError
-from hexacell.services.schedule.scheduled_run import (
+from hexacell.services.unattended.scheduled_run import (
     ScheduledRun,
     cell_of,
     crontab_line,

@@ -15,7 +15,7 @@ from pathlib import Path
 from hexacell.cell.loader import Cell
 from hexacell.cell.operation import DAY_MINUTES
 from hexacell.errors import FileError, UsageError
-from hexacell.services.schedule.scheduled_run import (
+from hexacell.services.unattended.scheduled_run import (
     ScheduledRun,
     cell_of,
     service_text,

@@ -1,5 +1,16 @@
-"""The robot of a recorded run: as it was when the run began, which geometries it had, its noise."""
+"""The cell of a recorded run: its robot when the run began, its noise, its devices against those of now.
 
+A device that is not what it was when the cell was last run was exchanged, set anew, or plugged elsewhere.
+That may be on purpose, and a new run takes them as they are. But a preset, a reversed direction or an
+exchanged encoder changes what a robot is thought to do, so it is a remark of the device.
+"""
+
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import replace
+
+from drivers.interfaces import DeviceIdentity
+from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
 from hexacell.config.interface import ControllerGeometry
 from hexacell.errors import HexacellError
@@ -7,8 +18,9 @@ from hexacell.identification.problem.commanded_poses import CommandingGeometry
 from hexacell.kinematics.geometry import Geometry
 from hexacell.noise.measured_noise import MeasuredNoise
 from hexacell.robot.model import Robot, make_robot
-from hexacell.runs.run_folder import RunFolder
-from hexacell.services.recorded.journal_soundness import read_sound
+from hexacell.runs.run_folder import RunFolder, run_folders
+from hexacell.services.history.journal_soundness import read_sound
+from procedures.journal.journal import decode
 from procedures.run.state import RunState
 from procedures.steps.events import RunStarted
 
@@ -55,3 +67,43 @@ def _state_of(folder: RunFolder, settings: CellSettings) -> RunState:
         return read_sound(folder, settings)[1]
     except HexacellError:
         return RunState()
+
+
+COMPARED = {
+    "protocol": "protocol",
+    "description": "device",
+    "serial_number": "serial number",
+    "settings": "settings",
+    "port": "port",
+}
+
+
+def with_changes(cell: Cell, found: Iterable[DeviceIdentity]) -> tuple[DeviceIdentity, ...]:
+    """Devices as found, each with a remark on what differs from the last run that can be read.
+
+    What the earlier run did not know is no change. The name of a run is its time.
+    """
+    run, known = _last(cell)
+    remarked = []
+    for now in found:
+        changes = []
+        for field, word in COMPARED.items():
+            before, after = getattr(known.get(now.name), field, None), getattr(now, field)
+            if before and before != after:
+                changes.append(f"{word} {after or 'none'}, which was {before}")
+        if changes:
+            remark = f"since the run {run}: {', '.join(changes)}"
+            remarked.append(replace(now, remark="; ".join(filter(None, (now.remark, remark)))))
+        else:
+            remarked.append(now)
+    return tuple(remarked)
+
+
+def _last(cell: Cell) -> tuple[str, dict[str, DeviceIdentity]]:
+    """The name of the last run whose first event can be read, and the devices with which it began."""
+    for run in reversed(run_folders(cell)):
+        with suppress(OSError, HexacellError), run.journal.open("rb") as journal:
+            entry = decode(journal.readline(), run.journal, 1)
+            if entry is not None and isinstance(entry.event, RunStarted) and entry.event.devices:
+                return run.name, {one.name: one for one in entry.event.devices}
+    return "", {}

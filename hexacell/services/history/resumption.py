@@ -21,7 +21,7 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.robot.model import Robot, controller_geometry
 from hexacell.robot.stated import stated_limits
 from hexacell.runs.run_folder import RunFolder, find_run, run_folders, runs_folder
-from hexacell.services.recorded.recorded_robot import started_robot
+from hexacell.services.history.recorded_cell import started_robot
 from procedures.journal.journal import RESTORE, read_entries
 from procedures.resources.controller_config import PROVISIONAL_FOLDER
 from procedures.run.keys import SixNumbers

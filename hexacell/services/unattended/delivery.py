@@ -26,7 +26,7 @@ from hexacell.cell.fields import Password, Section
 from hexacell.cell.operation import BROKERS, WEBHOOKS, NotificationSettings, Occasion, scheme_of
 from hexacell.cell.passwords import stated_secrets
 from hexacell.errors import UsageError
-from hexacell.services.notify.notice import Notice, NoticeUndelivered
+from hexacell.services.unattended.notice import Notice, NoticeUndelivered
 from hexacell.storage.toml_document import MASK
 
 _log = logging.getLogger(__name__)

@@ -15,7 +15,7 @@ from hexacell.services.history.cell_status import next_calibration_due
 from hexacell.services.history.past_runs import past_runs
 from hexacell.services.history.run_summary import judged_accuracy
 from hexacell.services.run.calibration_run import RunRequest
-from hexacell.services.schedule.unattended_runs import raised_alarm
+from hexacell.services.unattended.unattended_runs import raised_alarm
 from hexacell.verdict.decision import Verdict
 from procedures.run.state import RunState
 from procedures.steps import events

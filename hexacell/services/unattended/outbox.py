@@ -20,8 +20,8 @@ from pydantic import ValidationError
 from hexacell.cell.loader import Cell
 from hexacell.errors import FileError, HexacellError
 from hexacell.runs.run_folder import runs_folder
-from hexacell.services.notify.delivery import NoticeAddress, deliver, resolved_address
-from hexacell.services.notify.notice import Notice, PendingNotice, notice_id
+from hexacell.services.unattended.delivery import NoticeAddress, deliver, resolved_address
+from hexacell.services.unattended.notice import Notice, PendingNotice, notice_id
 from hexacell.storage import atomic_files
 
 FOLDER = ".outbox"

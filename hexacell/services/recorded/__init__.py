@@ -1,1 +1,0 @@
-"""Recorded runs: whether a journal is sound, whose it is, and what it says of robot and commands."""

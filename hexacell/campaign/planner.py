@@ -15,6 +15,8 @@ import numpy as np
 
 from hexacell.campaign.budget import Budget, shared_sizes
 from hexacell.campaign.decisions import (
+    CAUTION,
+    FIRST_PILOT,
     CampaignState,
     Decision,
     Finished,
@@ -22,10 +24,11 @@ from hexacell.campaign.decisions import (
     Forecast,
     MeasurePose,
     StartPoint,
+    most_pilots,
+    pilots_per_departure,
 )
 from hexacell.campaign.forecast import Forecaster, PlannedInformation, select_sets
 from hexacell.campaign.online_estimate import OnlineEstimate, OnlineEstimator, RecordEstimator
-from hexacell.campaign.pilots import CAUTION, FIRST_PILOT, most_pilots, pilots_per_departure
 from hexacell.campaign.pose_chooser import PoseChooser, is_well_known
 from hexacell.campaign.pose_list import PoseList
 from hexacell.campaign.stopping_rules import Goal, StoppingRules

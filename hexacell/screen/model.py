@@ -19,8 +19,8 @@ from hexacell.services.history.run_index import PastRun
 from hexacell.text.config_changes import RELOAD, versions_text
 from hexacell.text.history import NO_RUNS, history_head, history_line
 from hexacell.text.screens import live, reviewing
+from hexacell.text.screens.live import plan_lines, plan_note, plan_rows
 from hexacell.text.screens.measuring import accuracy_plot, fault_view, guidance, record_lines
-from hexacell.text.screens.planned_poses import plan_lines, plan_note, plan_rows
 from hexacell.text.screens.questions import PERSON, question_view
 from hexacell.text.screens.run_picture import header_line
 from hexacell.text.screens.views import ChecklistItem, FaultView, Line, QuestionView, Urgency

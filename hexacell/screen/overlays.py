@@ -15,8 +15,14 @@ from textual.widgets import Input
 
 from hexacell.screen.preferences import KEYS, preferences_path, shown_path
 from hexacell.screen.widgets import DevicePanel, TextList, TextPanel
-from hexacell.text.screens.help_texts import KEYS_NOTE, KEYS_TITLE, REPLAY_HELP, SCREEN_HELP
-from hexacell.text.screens.views import FaultView, QuestionView
+from hexacell.text.screens.views import (
+    KEYS_NOTE,
+    KEYS_TITLE,
+    REPLAY_HELP,
+    SCREEN_HELP,
+    FaultView,
+    QuestionView,
+)
 
 if TYPE_CHECKING:
     from hexacell.screen.model import ScreenModel

@@ -17,8 +17,7 @@ from textual.widgets import OptionList, Static
 from textual.widgets.option_list import Option
 
 from hexacell.screen.preferences import KEYS, ScreenAction
-from hexacell.text.screens.plot_lines import plot_lines
-from hexacell.text.screens.views import Line, PlotView, Urgency
+from hexacell.text.screens.views import Line, PlotView, Urgency, plot_lines
 
 if TYPE_CHECKING:
     from hexacell.screen.model import ScreenModel

@@ -1,16 +1,24 @@
 """Records of one robot by several ways to choose orientations, equally many at the same points."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import islice
 
 import numpy as np
 
 from hexacell.campaign.planner import Plan
 from hexacell.cell.model import CellSettings
 from hexacell.design.candidates import ReachableTargets, commands_for, reachable_targets
-from hexacell.design.criteria import D_OPTIMAL, covariance_update
-from hexacell.design.predicted_records import GaugeZero, estimate_gauge_zero, predict_records
+from hexacell.design.criteria import D_OPTIMAL, Criterion, covariance_update
+from hexacell.design.predicted_records import (
+    GaugeZero,
+    PredictedRecords,
+    estimate_gauge_zero,
+    predict_records,
+)
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief
@@ -21,7 +29,14 @@ from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.robot.model import Robot
 from hexacell.robot.virtual_robot import VirtualRobot
-from hexacell.study.data_sets import unlimited_travel
+from hexacell.study.data_sets import (
+    DataSet,
+    Reached,
+    data_set,
+    random_orientations,
+    reached,
+    unlimited_travel,
+)
 
 RANDOM_DEG = (20.0, 14.0, 10.0, 7.0, 5.0, 3.5, 2.5, 1.8, 1.2, 0.9, 0.6, 0.4)
 """Amplitudes of random angles, the largest first."""
@@ -191,3 +206,73 @@ def _inside(virtual: VirtualRobot, pose: Pose, point: int, orientation: int) -> 
     virtual.place(pose)
     record = virtual.measure(point, orientation)
     return [record] if virtual.model.limits.room.holds(np.array(record.deviation)) else []
+
+
+POOL_BATCHES = 10
+
+
+def chosen_orientations(
+    robot: Robot,
+    truth: Geometry,
+    points: Array,
+    orientations: int,
+    accurate_at: tuple[Array, float],
+    amplitude: float,
+    random: np.random.Generator,
+) -> DataSet:
+    """So many orientations within ``amplitude``, rad, at each of some points (m, 3), mm, that we choose.
+
+    By the drawing alone, before anything is measured, for gauges of any travel: of a pool of random
+    orientations at each point, one at a time, that which says most of the position at the poses where the
+    robot is to be accurate (I-optimality, :mod:`hexacell.design.criteria`).
+
+    Args:
+        robot: with its drawing, its tolerances and the noise of its records.
+        truth: the geometry that decides what can be reached.
+        points: where the gauges are.
+        orientations: at each point; the first is drawn.
+        accurate_at: points (k, 3), mm, at which it is to be accurate, within angles of so many rad.
+        amplitude: of each angle.
+        random: source of the pools.
+
+    Raises:
+        LimitError: a point cannot be reached.
+    """
+    belief = robot.belief()
+    pools = [_pool(robot, truth, point, amplitude, POOL_BATCHES, random) for point in points]
+    records = [_records(belief, pool) for pool in pools]
+    places, angle = accurate_at
+    task = [_records(belief, _pool(robot, truth, place, angle, 1, random)) for place in places]
+    criterion = Criterion(
+        sum(np.einsum("nij,nik->jk", one.jacobian, one.jacobian) / len(one) for one in task)
+    )
+    taken, covariance = [[0] for _ in pools], belief.covariance
+    for _ in range(orientations - 1):
+        for rows, some in zip(taken, records, strict=True):
+            gain = criterion.gain(covariance, some.jacobian, some.covariance)
+            gain[rows] = -np.inf
+            best = int(gain.argmax())
+            rows.append(best)
+            covariance = covariance_update(covariance, some.jacobian[best], some.covariance[best])
+    return data_set(
+        robot, [pool[np.array(rows)] for pool, rows in zip(pools, taken, strict=True)], orientations
+    )
+
+
+def _pool(
+    robot: Robot, truth: Geometry, point: Array, amplitude: float, batches: int, random: np.random.Generator
+) -> Reached:
+    """What can be reached of some batches of random orientations at a point."""
+    turns = islice(random_orientations(random, amplitude), batches)
+    margin = robot.limits.singularity_margin
+    return Reached.joined(
+        [reached(robot, truth, robot.frames.poses(PoseBatch.at(point, each)), margin) for each in turns]
+    )
+
+
+def _records(belief: RobotBelief, pool: Reached) -> PredictedRecords:
+    """The records of a pool, by the drawing, with the gauges zeroed at its first pose."""
+    targets = ReachableTargets(pool.commands, pool.joints)
+    first = pool[:1]
+    zero = estimate_gauge_zero(belief, first.commands, first.joints, np.zeros((1, 3)))
+    return predict_records(belief, zero, targets)

@@ -2,15 +2,14 @@
 
 The noise is measured at the first reference: read at rest, leave and come back. As long as little is known
 of the robot it leaves for pilot poses, which steer the choice of the others
-(:mod:`hexacell.campaign.pilots`), and else for level ones beside the reference.
+(:mod:`hexacell.campaign.decisions`), and else for level ones beside the reference.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell.campaign.decisions import FinishPoint, MeasurePose, StartPoint
-from hexacell.campaign.pilots import FIRST_PILOT
+from hexacell.campaign.decisions import FIRST_PILOT, FinishPoint, MeasurePose, StartPoint
 from hexacell.campaign.planner import Plan
 from hexacell.errors import HexacellError
 from hexacell.kinematics.rotations import Array

@@ -1,7 +1,6 @@
 """Pictures in characters."""
 
-from hexacell.text.screens.plot_lines import plot_lines
-from hexacell.text.screens.views import PlotView, Series
+from hexacell.text.screens.views import PlotView, Series, plot_lines
 
 
 def view(**changes: object) -> PlotView:

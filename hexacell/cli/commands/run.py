@@ -35,7 +35,7 @@ from hexacell.text.run import (
     demo_opening,
     resume_hint,
 )
-from hexacell.text.screens.planned_poses import exclusions_text
+from hexacell.text.screens.live import exclusions_text
 from procedures.calibration.calibration import Mode, expected_records
 from procedures.engine.commands import CommandQueue, UnattendedOperator
 from procedures.engine.engine import Listener

@@ -9,7 +9,7 @@ import pytest
 
 from drivers.errors import PoseRefused
 from hexacell.campaign import planner
-from hexacell.campaign.pilots import FIRST_PILOT
+from hexacell.campaign.decisions import FIRST_PILOT
 from hexacell.cell.simulation import SoftLimits
 from hexacell.errors import ExitCode, IdentifiabilityError
 from hexacell.kinematics.pose import Pose

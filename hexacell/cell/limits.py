@@ -1,6 +1,6 @@
 """Section of the cell file on the limits of motion: of commands, joint variables, joints and legs."""
 
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
@@ -146,6 +146,26 @@ class LimitSettings(Section):
             low, high = self.key("joint_min"), self.key("joint_max")
             raise broken_rule(f"{low} must be below {high}", "Exchange or correct them")
         return self
+
+
+class MotionSettings(Section):
+    """How stops are reached."""
+
+    approach: Literal["any", "one-sided"] = key(
+        "any",
+        "from which side joints arrive at a stop: any, or always the same, by an overshoot before it, so "
+        "that backlash drops out; the robot at work must then be approached in the same way",
+    )
+    direction: Literal["positive", "negative"] = key(
+        "positive", "the direction in which every joint arrives where the approach is one-sided"
+    )
+
+    @property
+    def sign(self) -> int:
+        """The direction in which every joint is to arrive, 1 or -1; 0 for any."""
+        if self.approach == "any":
+            return 0
+        return 1 if self.direction == "positive" else -1
 
 
 class SpeedSettings(Section):

@@ -9,7 +9,13 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from hexacell.cell.devices import EncoderSettings, GaugeSettings, ThermometerSettings
 from hexacell.cell.fields import CertificateSettings, Name, Section, broken_rule, key
-from hexacell.cell.limits import MOST_EXCLUSIONS, ExclusionSettings, LimitSettings, SpeedSettings
+from hexacell.cell.limits import (
+    MOST_EXCLUSIONS,
+    ExclusionSettings,
+    LimitSettings,
+    MotionSettings,
+    SpeedSettings,
+)
 from hexacell.cell.measuring import (
     AcceptanceSettings,
     CheckSettings,
@@ -71,6 +77,7 @@ class CellSettings(Section):
     model: ModelSettings = ModelSettings()
     limits: LimitSettings = LimitSettings()
     exclusions: tuple[ExclusionSettings, ...] = Field((), max_length=MOST_EXCLUSIONS)
+    motion: MotionSettings = MotionSettings()
     speed: SpeedSettings = SpeedSettings()
     timing: TimingSettings = TimingSettings()
     guards: GuardSettings = GuardSettings()

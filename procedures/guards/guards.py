@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -79,15 +79,15 @@ class Guards:
         await self.while_not_ready(order)
 
     async def move(
-        self, target: Pose, duration_s: float, watched: WatchedSet, commanded: Callable[[], Array]
+        self, moves: Sequence[tuple[Pose, float]], watched: WatchedSet, commanded: Callable[[], Array]
     ) -> None:
-        """Move to a pose; ``commanded`` gives the joint variables (6,) there."""
+        """Move to poses, in s each; ``commanded`` gives the joint variables (6,) at the last of them."""
         gauges = self._watched_gauges(watched)
         pollers = self._pollers(controller=True, gauges=gauges)
         limits = self._limits(zero_mm=watched.zero_mm)
         try:
             reached = await self.supervisor.supervise(
-                lambda: self._go(target, duration_s), pollers, limits, STOP_GRACE_S
+                lambda: self._go(moves), pollers, limits, STOP_GRACE_S
             )
         except MotionInterrupted:
             # Where the forward kinematics failed, the robot is not where this error says that it stopped.
@@ -134,8 +134,9 @@ class Guards:
         found = await self.position.read(reached, following=self._following)
         return following if following and found.odd is PositionSource.ENCODERS else found.trip or following
 
-    async def _go(self, target: Pose, duration_s: float) -> EncoderSample:
-        await self._devices.controller.move(target, duration_s)
+    async def _go(self, moves: Sequence[tuple[Pose, float]]) -> EncoderSample:
+        for target, duration_s in moves:
+            await self._devices.controller.move(target, duration_s)
         return await self._devices.read_encoders()
 
     def _limits(self, rest: float | None = None, zero_mm: ThreeNumbers | None = None) -> GuardLimits:

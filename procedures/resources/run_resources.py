@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -123,10 +124,10 @@ class RunResources:
             action = "Retry: the run then plans its way from where the robot is"
             raise supervisor.latch(Trip(Guard.POSITION, "controller", problem, action))
 
-    async def has_stayed(self, state: RunState) -> bool:
-        """Whether the robot is still where it was commanded last; raises ``GuardTripped``."""
+    async def is_at(self, pose: SixNumbers | None) -> bool:
+        """Whether the robot stands where it was commanded to, or is to be; raises ``GuardTripped``."""
         here = await self.guards.locate()
-        return state.target is not None and self._is_at(here.pose, state.target)
+        return pose is not None and self._is_at(here.pose, pose)
 
     def _is_at(self, here: Pose, target: SixNumbers) -> bool:
         """Whether a reported pose is a commanded one; each may be off by the tolerance of an arrival."""
@@ -136,27 +137,29 @@ class RunResources:
         is_near = position <= 2.0 * settings.position_tolerance_mm
         return bool(is_near and angle <= 2.0 * settings.angle_tolerance_deg)
 
-    async def move(self, start: Pose, target: Pose, watched: WatchedSet, *, at_gauges: bool) -> None:
-        """Move under guards, as fast as the cell file allows with or without gauges at the ball."""
+    async def move(self, way: Sequence[Pose], watched: WatchedSet, *, at_gauges: bool) -> None:
+        """Move from pose to pose under guards, as fast as allowed with or without gauges at the ball."""
         commanding = self.current_config.geometry()
         lines = LineDurations(self.settings.mechanism, commanding.geometry, commanding.branch)
-        duration_s = lines.of(start, target, speed_limits(self.settings.speed, at_gauges=at_gauges))
+        limits = speed_limits(self.settings.speed, at_gauges=at_gauges)
+        moves = [(end, lines.of(start, end, limits)) for start, end in pairwise(way)]
 
         def commanded() -> Array:
             now, mechanism = self.current_config.geometry(), self.calibration.robot.mechanism
             states = now.geometry, now.branch, now.corrections
-            commands, _ = commanded_joints(mechanism, *states, PoseBatch.of([target]))
+            commands, _ = commanded_joints(mechanism, *states, PoseBatch.of([way[-1]]))
             joints: Array = commands[0]
             return joints
 
-        await self.guards.move(target, duration_s, watched, commanded)
+        await self.guards.move(moves, watched, commanded)
 
-    def arrival_directions(self, state: RunState, start: Pose, target: Pose) -> Directions:
-        """From which side each joint arrives at the end of a move, by the controller's straight line."""
+    def arrival_directions(self, state: RunState, way: Sequence[Pose]) -> Directions:
+        """From which side each joint arrives at the end of a way, by the controller's straight lines."""
         commanding, mechanism = self.current_config.geometry(), self.settings.mechanism
-        line = interpolate_line(PoseBatch.of([start]), PoseBatch.of([target]), ARRIVAL_PIECES)
+        poses = [PoseBatch.of([pose]) for pose in way]
+        lines = PoseBatch.joined([interpolate_line(*ends, ARRIVAL_PIECES) for ends in pairwise(poses)])
         states = commanding.geometry, commanding.branch, commanding.corrections
-        joints, _ = commanded_joints(mechanism, *states, line)
+        joints, _ = commanded_joints(mechanism, *states, lines)
         stops = self.calibration.known(state).allowances.stops
         least = least_way(mechanism.words.joint_unit, stops)
         return arrival_directions(joints, state.directions, least)

@@ -30,10 +30,14 @@ STUCK_GAUGE_SIGMAS = 5.0
 
 
 class Arrived(EventAtPose):
-    """A move has ended at its pose; ``directions`` say from which side each joint arrived."""
+    """A move has ended at its pose; ``directions`` say from which side each joint arrived.
+
+    ``straight``: the cell file wants one direction, and no waypoint before the pose was possible.
+    """
 
     kind: Literal["arrived"] = "arrived"
     directions: ArrivalDirections = ()
+    straight: bool = False
 
     def applied_to(self, state: RunState) -> RunState:
         """The gauges of all other open sets may be carried away now."""
@@ -52,6 +56,11 @@ class Arrived(EventAtPose):
         )
         return arrived.unverified(but=self.at)
 
+    def text(self, state: RunState) -> str | None:
+        if not self.straight or self.orientation == 0:
+            return None
+        return f"{self.at.pose_name(self.orientation)}: reached straight, no waypoint before it is possible"
+
     def _path(self, state: RunState) -> tuple[tuple[int, SixNumbers], ...]:
         """The path from the reference without loops; empty if the robot did not start from its end."""
         poses = [pose for _, pose in state.path_from_reference]
@@ -68,7 +77,8 @@ class PoseExcluded(EventAtPose):
 
     ``axis`` is the axis beyond whose limit it is, the highest or the lowest; then no pose is commanded that
     is as far out. Without it the pose alone is left out. ``replacements`` are held-out poses that cannot be
-    commanded now, each with the one that takes its place.
+    commanded now, each with the one that takes its place. ``has_left``: the robot was at a waypoint before
+    the pose by then.
     """
 
     kind: Literal["excluded"] = "excluded"
@@ -76,9 +86,11 @@ class PoseExcluded(EventAtPose):
     axis: Literal["x", "y", "z", "a", "b", "c"] | None = None
     is_highest: bool = True
     replacements: tuple[tuple[SixNumbers, SixNumbers], ...] = ()
+    has_left: bool = False
 
     def applied_to(self, state: RunState) -> RunState:
         """The robot is where it was; a record that was to be taken again at the pose is chosen anew."""
+        state = state.without_position() if self.has_left else state
         left = replace(state, excluded=(*state.excluded, self), identified=self._with_replacements(state))
         if self.at not in state.sets:
             return left
@@ -118,11 +130,15 @@ class Move(StepAtPose):
     """Send the robot to a pose. Orientation 0 is a waypoint, at which nothing is measured.
 
     With ``from_elsewhere`` it comes from where the set's gauges are not, as to a set's first reference.
+    From a ``waypoint`` every joint arrives in the direction that the cell file wants; where it wants one
+    and no waypoint is possible, the move is ``straight``.
     """
 
     kind: Literal["move"] = "move"
     expected: Expectation | None = None
     from_elsewhere: bool = False
+    waypoint: SixNumbers | None = None
+    straight: bool = False
 
     outcomes: ClassVar = (Arrived, PoseExcluded)
 
@@ -140,9 +156,10 @@ class Move(StepAtPose):
         """Move under guards; with a new geometry a ball that leaves its plate is a rejected record."""
         await run.require_departure(state)
         here = Pose(*state.target) if state.target else (await run.locate()).pose
+        way = [here, *([] if self.waypoint is None else [Pose(*self.waypoint)]), self.target]
         at_gauges = gauges_are_at_ball(run.settings, self.at, state)
         try:
-            await run.move(here, self.target, self._watched(state), at_gauges=at_gauges)
+            await run.move(way, self._watched(state), at_gauges=at_gauges)
         except PoseRefused as refusal:
             return await self._refused(run, state, refusal)
         except GuardTripped as tripped:
@@ -157,8 +174,13 @@ class Move(StepAtPose):
             run.guards.supervisor.clear()
             reason = str(tripped)
             return RecordRejected(at=self.at, orientation=self.orientation, reason=reason, on_the_way=True)
-        directions = run.arrival_directions(state, here, self.target)
-        return Arrived(at=self.at, orientation=self.orientation, pose=self.pose, directions=directions)
+        return Arrived(
+            at=self.at,
+            orientation=self.orientation,
+            pose=self.pose,
+            directions=run.arrival_directions(state, way),
+            straight=self.straight,
+        )
 
     def _watched(self, state: RunState) -> WatchedSet:
         """What the gauges of the set must show on the way."""
@@ -172,18 +194,24 @@ class Move(StepAtPose):
         return WatchedSet(zero_mm, is_watched=is_watched, moved_mm=moved_mm)
 
     async def _refused(self, run: RunResources, state: RunState, refusal: PoseRefused) -> PoseExcluded:
-        """A refusal of the pose is no failure: the robot is where it was, and others may be possible."""
-        has_stayed = await run.has_stayed(state)
+        """A refusal of the pose is no failure: the robot is where it was, and others may be possible.
+
+        Where it still is, its waypoint was refused, without which the pose is tried straight.
+        """
+        has_stayed = await run.is_at(state.target)
+        has_left = not has_stayed and self.waypoint is not None and await run.is_at(self.waypoint)
         refusals = sum(one.at == self.at for one in state.excluded)
-        if refusals >= run.most_refusals or not has_stayed:
+        if refusals >= run.most_refusals or not (has_stayed or has_left):
             raise refusal
+        of_waypoint = self.waypoint if has_stayed else None
         excluded = PoseExcluded(
             at=self.at,
-            orientation=self.orientation,
-            pose=self.pose,
+            orientation=0 if of_waypoint else self.orientation,
+            pose=of_waypoint or self.pose,
             reason=refusal.reason,
             axis=refusal.axis,
             is_highest=refusal.is_highest,
+            has_left=has_left,
         )
         return await in_thread(_with_replacements, excluded, run, state)
 

@@ -18,7 +18,7 @@ from procedures.run.state import RunState
 from procedures.steps.locate import Locate
 from procedures.steps.move import Move
 from procedures.steps.registry import Step
-from procedures.workflow.sets import NoSafePath, SetSteps, TravelError, reference_pose
+from procedures.workflow.sets import NoSafePath, SetSteps, TravelError
 from procedures.workflow.trial import TrialSteps
 
 BESIDE_MM = np.array([1.0, -0.8, 0.6])
@@ -96,9 +96,5 @@ class LengthSteps:
 
     def _zero(self, state: RunState, key: SetKey) -> Array | None:
         """Where the ball is (3,), mm, with the gauges at zero, by what is known now."""
-        samples = state.set(key).samples
-        ball = self.sets.paths.ball_at(state, reference_pose(state, key)) if samples else None
-        if ball is None:
-            return None
-        zero: Array = ball - self.sets.robot.frames.base @ np.array(samples[0].deviation_mm)
+        _, zero = self.sets.paths.known(state, key)
         return zero

@@ -22,9 +22,11 @@ from procedures.steps.base import BaseEvent, BaseStep
 from procedures.steps.commit import Commit
 from procedures.steps.identify import Identify
 from procedures.steps.judge import Judge, ResultValidated
+from procedures.steps.move import Move
 from procedures.steps.propose import Propose
 from procedures.steps.roll_back import RollBack
 from procedures.steps.take_back import TakeBack
+from procedures.workflow.approach import Approach
 from procedures.workflow.held_out import HeldOutSteps
 from procedures.workflow.length import LengthSteps
 from procedures.workflow.points import IdentificationSteps, NoiseSteps
@@ -56,6 +58,12 @@ def next_step(calibration: Calibration, state: RunState) -> BaseStep | None:
         return TakeBack()
     known = calibration.known(state)
     measuring = Measuring(known.measuring, known.allowances)
+    step = _decided(calibration, measuring, state)
+    return measuring.approach.of_move(step, state) if isinstance(step, Move) else step
+
+
+def _decided(calibration: Calibration, measuring: "Measuring", state: RunState) -> BaseStep | None:
+    """The step to execute, where a move goes straight to its end."""
     if state.recalled is not None:
         return _way_back(measuring, state)
     if calibration.mode in {Mode.LENGTH, Mode.CHECK}:
@@ -77,6 +85,7 @@ class Measuring:
         trials = TrialSteps(settings.stations.trial_mm, sets, allowances)
         self.points = IdentificationSteps(plan, sets, NoiseSteps(plan, sets), trials)
         self.held_out = HeldOutSteps(len(settings.verification.points), sets, trials)
+        self.approach = Approach.of(settings, sets.paths, allowances.stops)
         fixture = settings.length_check
         self.length = None if fixture is None else LengthSteps(fixture, sets, trials)
 

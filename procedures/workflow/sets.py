@@ -62,7 +62,7 @@ class RunPathPlanner:
         """
         if state.target is None:
             return goal
-        start = self._command(state.target)
+        start = self.command(state.target)
         belief = self._belief(state).zeroed_at(state.zero_shown(goal.at))
         move = self._next_move(state, goal, belief, reference)
         if reference is None or _is_inside(belief, start, reference, ELSEWHERE):
@@ -76,10 +76,10 @@ class RunPathPlanner:
         samples = state.set(goal.at).samples
         visited = [(s.orientation, s.pose) for s in samples if s.orientation != goal.orientation]
         via = [*((0, pose) for pose in levels), *visited]
-        start, end = self._command(state.target), self._command(goal.pose)
+        start, end = self.command(state.target), self.command(goal.pose)
         if reference is not None and not _is_inside(belief, start, reference):
             reference = None
-        route = find_route(belief, start, end, [self._command(pose) for _, pose in via], reference)
+        route = find_route(belief, start, end, [self.command(pose) for _, pose in via], reference)
         if route:
             orientation, pose = via[route[0]]
             return Move(at=goal.at, orientation=orientation, pose=pose)
@@ -114,15 +114,24 @@ class RunPathPlanner:
         move = next_return_move(belief, zero.reference, commands, departure)
         return moves[move] if isinstance(move, int) else self._waypoint(key, move)
 
+    def known(self, state: RunState, key: SetKey) -> tuple[RobotBelief, Array | None]:
+        """The robot, and where its ball is (3,), mm, with a set's gauges at zero; None before they are."""
+        belief, samples = self._belief(state).zeroed_at(state.zero_shown(key)), state.set(key).samples
+        ball = ball_position(belief, self.command(samples[0].pose)) if samples else None
+        if ball is None:
+            return belief, None
+        return belief, ball - self.robot.frames.base @ np.array(samples[0].deviation_mm)
+
     def ball_at(self, state: RunState, pose: SixNumbers) -> Array | None:
         """The estimated position (3,), mm, of the ball at a commanded pose."""
-        return ball_position(self._belief(state), self._command(pose))
+        return ball_position(self._belief(state), self.command(pose))
 
     def _waypoint(self, key: SetKey, command: Pose) -> Move:
         """A move to a pose in the convention's frames at which nothing is measured."""
         return Move(at=key, orientation=0, pose=self.robot.to_command(command).as_tuple())
 
-    def _command(self, pose: SixNumbers) -> PoseBatch:
+    def command(self, pose: SixNumbers) -> PoseBatch:
+        """A pose of the controller as a command (1) in the convention's frames."""
         return self.robot.from_commands([Pose(*pose)])
 
     def _belief(self, state: RunState) -> RobotBelief:

@@ -75,7 +75,7 @@ class Watched:
         watched = WatchedSet(self.state.zero_shown(P1), is_watched=True)
         target = Pose(0.0, 0.0, 550.0, 0.0, 0.0, 4.0)
         await self.guards.move(
-            target, 1.3, watched, lambda: np.array(self.simulated.physics.encoder_positions())
+            [(target, 1.3)], watched, lambda: np.array(self.simulated.physics.encoder_positions())
         )
 
 

@@ -55,7 +55,7 @@ class Story:
         pose: SixNumbers | None = None,
     ) -> events.Event:
         reading = READING.model_copy(update={"gauges_mm": deviation})
-        where = self.arrived(orientation, pose).model_dump(exclude={"kind", "directions"})
+        where = self.arrived(orientation, pose).model_dump(include={"at", "orientation", "pose"})
         return events.RecordTaken(**where, reading=reading, deviation_mm=deviation)
 
     def refused(self, orientation: int = 2, *, on_the_way: bool = False) -> events.Event:
@@ -65,7 +65,7 @@ class Story:
         )
 
     def excluded(self, orientation: int = 2, pose: SixNumbers | None = None) -> events.Event:
-        where = self.arrived(orientation, pose).model_dump(exclude={"kind", "directions"})
+        where = self.arrived(orientation, pose).model_dump(include={"at", "orientation", "pose"})
         return events.PoseExcluded(**where, reason="would exceed joint 3's positive limit")
 
     def closed(self) -> events.Event:

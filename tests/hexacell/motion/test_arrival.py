@@ -1,5 +1,6 @@
 """From which side joints arrive, against elements with hysteresis: what is said to be known is so."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -7,8 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
 from hexacell.kinematics.parameters import JointUnit
+from hexacell.kinematics.pose import Pose
 from hexacell.motion.arrival import STILL_SHARE, arrival_directions, least_way
+from hexacell.motion.overshoot import clear_waypoint_before, waypoint_before
+from hexacell.robot.model import robot_of
 
 LEAST = 0.3
 ways = st.sampled_from([0.0, 1e-5, 0.05, 0.2, 0.31, 2.0]) | st.floats(0.0, 1.0)
@@ -58,6 +64,22 @@ def test_what_is_known_is_where_an_element_with_hysteresis_is(moves, lost, insid
 )
 def test_short_ways(way, before, after):
     assert arrived(way, before) == after
+
+
+@pytest.mark.parametrize("name", ["simulated-hexaglide", "gough-stewart", "rotary-cranks"])
+def test_at_the_waypoint_every_joint_stands_short_of_its_stop(name):
+    cell = load_cell(bundled_config(name))
+    robot, reference = robot_of(cell), Pose(*cell.settings.identification.points[0], 3.0, -4.0, 2.0)
+    belief, stop = robot.belief(), robot.from_commands([reference])
+    for back in (0.45, -0.45):
+        waypoint = waypoint_before(belief, stop, back)
+        assert waypoint is not None
+        ways = np.subtract(*map(belief.commanded.joints, (stop, waypoint)))
+        assert ways == pytest.approx(np.full((1, 6), back), abs=1e-9)
+    lowest = float(belief.commanded.joints(stop).min()) - 0.2
+    beyond = replace(belief, limits=replace(belief.limits, joint_min=lowest))
+    assert clear_waypoint_before(belief, stop, stop, 0.45, None) is not None
+    assert clear_waypoint_before(beyond, None, stop, 0.45, None) is None
 
 
 def test_a_machine_that_stops_beside_its_commands_must_go_farther():

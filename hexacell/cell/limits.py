@@ -161,7 +161,7 @@ class MotionSettings(Section):
     )
 
     @property
-    def sign(self) -> int:
+    def sign(self) -> Literal[-1, 0, 1]:
         """The direction in which every joint is to arrive, 1 or -1; 0 for any."""
         if self.approach == "any":
             return 0

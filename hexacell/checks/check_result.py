@@ -97,6 +97,7 @@ def check_result(
             task,
             task_named=bool(check.settings.task.poses),
             length=None if earlier is None else earlier.length,
+            direction=check.settings.motion.sign,
         ),
         is_consistent=stated.is_consistent,
         further_records=stated.further_records,

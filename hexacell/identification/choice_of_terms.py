@@ -53,14 +53,20 @@ class ChosenTerms:
 def choose_terms(found: Identification) -> ChosenTerms:
     """Choose among the terms that the problem of an identification offers.
 
-    One that acts by the direction of arrival takes part only where records know it.
+    One that acts by the direction of arrival takes part only where records know it, and it is not always
+    the same: then what it does is another zero of the encoders.
     """
     problem = found.problem
-    knows_directions = bool(problem.directions.any())
-    offered = tuple(term for term in problem.offered if knows_directions or not term.needs_directions)
+    up, down = (problem.directions > 0.0).any(axis=0), (problem.directions < 0.0).any(axis=0)
+    by_direction = tuple(term for term in problem.offered if term.needs_directions)
+    left = () if (up & down).any() else by_direction
+    one_sided = left if (up | down).any() else ()
+    findings = tuple(TermFinding(term.name, Finding.ONE_SIDE, 0.0) for term in one_sided)
+    offered = tuple(term for term in problem.offered if term not in left)
     if not offered:
-        return ChosenTerms()
-    return replace(_Search.of(found, offered).chosen(), offered=offered)
+        return ChosenTerms(findings=findings)
+    chosen = _Search.of(found, offered).chosen()
+    return replace(chosen, findings=(*findings, *chosen.findings), offered=offered)
 
 
 Model = tuple[ModelTerm, ...]

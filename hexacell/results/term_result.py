@@ -60,7 +60,7 @@ def term_results(found: Identification) -> tuple[TermResult, ...]:
             name=tried.name,
             finding=tried.finding,
             log_factor=tried.log_factor,
-            predicted=tried.predicted if tried.finding is not Finding.NOT_SHOWN else None,
+            predicted=None if np.isnan(tried.predicted) else tried.predicted,
             rival=tried.rival,
         )
         if found.terms is not None and tried.name in terms:

@@ -24,6 +24,8 @@ def _sentence(result: TermResult) -> str:
             return f"{result.name} cannot be told apart from {result.rival}; nothing is corrected of it."
         case Finding.NOT_PREDICTED | Finding.FAULTS:
             return f"{result.name} is not taken: {result.finding}."
+        case Finding.ONE_SIDE:
+            return f"{result.name} is not needed: it {result.finding}."
         case Finding.NOT_SHOWN:
             return f"{result.name} is not shown."
 

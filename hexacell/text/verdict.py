@@ -61,6 +61,8 @@ def _error_lines(accuracy: VerifiedAccuracy | None) -> Iterator[str]:
         where = f"at {accuracy.poses} {what}" if name == "position" else "there"
         limit = error.shown_in(unit).limit(error.limit)
         yield f"  largest {name} error {where}: {_size(error, unit)} (limit {limit})"
+    if accuracy.approach:
+        yield f"  {accuracy.approach}"
     if (geometry := accuracy.of_geometry) is not None:
         size = _size(geometry.position, "mm")
         yield f"  of that by the geometry: {size}: {geometry.verdict}; the rest is scatter"

@@ -163,6 +163,7 @@ class VerifiedAccuracy(Frozen):
         poses: their number, and whether the cell file names them; else they span the workspace.
         worst: the pose with the largest position error, in the controller's frames.
         scale_of: what says how long a millimetre is: the encoders, or the drawing where these read angles.
+        direction: in which every joint arrives at the stops that it holds for, 1 or -1; 0 for any.
     """
 
     position: JudgedError
@@ -173,6 +174,7 @@ class VerifiedAccuracy(Frozen):
     of_geometry: GeometryErrors | None = None
     length: LengthResult | None = None
     scale_of: Literal["encoders", "drawing"] = "encoders"
+    direction: Literal[-1, 0, 1] = 0
 
     @classmethod
     def of(
@@ -185,6 +187,7 @@ class VerifiedAccuracy(Frozen):
         task_named: bool,
         of_geometry: TaskErrors | None = None,
         length: LengthResult | None = None,
+        direction: Literal[-1, 0, 1] = 0,
     ) -> VerifiedAccuracy:
         """The decision on errors at the poses of a ``task`` that the ``robot`` reaches."""
         joint_unit, judged = robot.mechanism.words.joint_unit, GeometryErrors.of(errors, limits)
@@ -197,7 +200,14 @@ class VerifiedAccuracy(Frozen):
             worst=robot.to_command(task.poses.pose(errors.worst)).as_tuple(),
             length=length,
             scale_of="encoders" if joint_unit is JointUnit.MM else "drawing",
+            direction=direction,
         )
+
+    @property
+    def approach(self) -> str:
+        """How the stops that it holds for are reached, in words; empty for any way."""
+        word = "positive" if self.direction > 0 else "negative"
+        return f"for stops reached in the {word} direction of every joint" if self.direction else ""
 
     @property
     def errors(self) -> tuple[tuple[str, str, JudgedError], ...]:

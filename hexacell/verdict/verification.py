@@ -200,7 +200,14 @@ def verified_accuracy(
     of_geometry = budget.errors_of(difference, of_geometry=True) if budget.scatters else None
     limits, is_named = ErrorLimits.of(settings.acceptance), bool(settings.task.poses)
     return VerifiedAccuracy.of(
-        errors, limits, robot, task, task_named=is_named, of_geometry=of_geometry, length=length
+        errors,
+        limits,
+        robot,
+        task,
+        task_named=is_named,
+        of_geometry=of_geometry,
+        length=length,
+        direction=settings.motion.sign,
     )
 
 

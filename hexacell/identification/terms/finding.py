@@ -13,6 +13,7 @@ class Finding(StrEnum):
     NOT_SHOWN = "not shown"
     NOT_PREDICTED = "does not predict the records of other points better"
     FAULTS = "faults of records explain them better"
+    ONE_SIDE = "is the same at every stop, as all were reached from one side"
     NOT_DISTINCT = "cannot be told apart from another"
 
 

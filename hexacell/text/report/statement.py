@@ -134,6 +134,7 @@ def scope_sentences(accuracy: VerifiedAccuracy | None) -> str:
         return "Nothing is stated of errors at the task."
     where = "the task poses of the cell file" if accuracy.task_named else "poses across the workspace"
     scale = " ".join(scale_lines(accuracy.length, accuracy.scale_of)) or not_checked(accuracy.scale_of)
+    where += f", {accuracy.approach}" if accuracy.approach else ""
     return (
         f"This holds at {where}, at the time and under the conditions below, after the best choice of "
         f"frames that can be taught. {scale}"

@@ -59,6 +59,10 @@ def test_a_verdict_fits_six_lines_with_what_must_be_taught_anew() -> None:
         "  mean deviation at held-out poses 4.90 -> 0.030 mm",
         f"  {not_checked()}",
     ]
+    one_sided = accuracy().model_copy(update={"direction": -1})
+    of_one_side = verification_text(verified.model_copy(update={"accuracy": one_sided})).splitlines()
+    assert of_one_side[3] == "  for stops reached in the negative direction of every joint"
+    assert [*of_one_side[:3], *of_one_side[4:]] == lines
     failed = Verification(verdict=Verdict.NOT_EVALUATED, tests=outcomes(True, False), accuracy=accuracy())
     lines = verification_text(failed).splitlines()
     assert lines[0] == "verdict: not evaluated"

@@ -21,6 +21,7 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.results.absorbed_terms import absorbing
 from hexacell.results.term_result import corrections_for, known_terms, term_results
 from hexacell.robot.model import Robot
+from hexacell.text.terms import terms_text
 from tests.benchmarks.worlds import budgets
 from tests.benchmarks.worlds.campaigns import Setting, setting
 from tests.benchmarks.worlds.not_geometry import NOTHING, effect_of, terms_of
@@ -56,6 +57,15 @@ def measured(*names: str) -> MeasurementSet:
 @cache
 def identified(*names: str) -> Identification:
     return identify(robot().problem(measured(*names)))
+
+
+def test_backlash_is_not_needed_where_all_stops_were_reached_from_one_side() -> None:
+    one_sided = [replace(one, directions=(1,) * 6) for one in measured("play").records]
+    backlash, play, _ = term_results(identify(robot().problem(MeasurementSet(tuple(one_sided)))))
+    assert (backlash.finding, backlash.predicted, play.is_taken) == (Finding.ONE_SIDE, None, True)
+    assert "backlash is not needed: it is the same at every stop" in " ".join(
+        terms_text([backlash]).split()
+    )
 
 
 def largest_mm(geometry: Geometry, left: Mapping[str, Array]) -> float:

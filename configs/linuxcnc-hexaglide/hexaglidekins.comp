@@ -4,6 +4,9 @@ The rails run along base x. With joint i at q, the leg from the slider's joint (
 the platform's joint b.i, given in the platform's frame, is l.i long. Millimetres; the platform is turned by
 a, b, c degrees about the fixed axes x, y, z in this order, as with genhexkins.
 
+A leg that the platform's weight pulls is longer by half its play, one that it pushes is shorter by as much,
+and each is longer by its compliance times its force. With play and compliance 0 nothing is.
+
 Set the pins while the machine is off, and look at fwd-kins-fail before it is switched on again.
 """;
 pin in float s.#.x[6] "joint on slider # with the slider at 0, base frame";
@@ -14,6 +17,16 @@ pin in float b.#.y[6];
 pin in float b.#.z[6];
 pin in float l.#[6] "length of the leg";
 pin in float branch.#[6] "side of its platform joint on which slider # stands: -1 towards -x, 1 towards +x";
+pin in float play.#[6] "difference of the leg's length between pull and push";
+pin in float compliance.#[6] "by how much the leg is longer with a force of 1 N, mm";
+pin in float weight "of the platform with what it carries, N";
+pin in float weight-direction.x "where it pulls, base frame";
+pin in float weight-direction.y;
+pin in float weight-direction.z = -1.0;
+pin in float weight-centre.x "where it acts, platform frame, unless in the middle of the joints there";
+pin in float weight-centre.y;
+pin in float weight-centre.z;
+pin in float weight-in-middle = 1.0 "1: it acts in the middle of the joints on the platform, 0: in its centre";
 pin in float convergence-criterion = 1e-9 "largest error of a leg, mm, at which the forward kinematics ends";
 pin in unsigned limit-iterations = 30 "of the forward kinematics";
 pin out bit fwd-kins-fail "the last forward kinematics found no pose; the pose that is shown is none";
@@ -33,6 +46,8 @@ author "hexacell";
 #define DEGREE (M_PI / 180.0)
 #define LARGEST_STEP 20.0 /* mm; and rad, in parts of 100 mm */
 #define SMALLEST_PIVOT 1e-12
+#define SMALL_STEP 1e-6 /* of differences, mm and rad */
+#define SEATED 0.005 /* of the weight; a leg with less force is between both lengths, so that no joint jumps */
 
 static struct __comp_state *the_only_one;
 
@@ -83,14 +98,14 @@ static void leg_at(struct __comp_state *__comp_inst, int i, const Platform *at, 
 }
 
 /* Errors of the legs, mm, and their derivatives by a shift and a turn of the platform; returns the largest. */
-static double linearize(struct __comp_state *__comp_inst, const double *joint, const Platform *at,
-                        double error[SIZE], double by_pose[SIZE][SIZE])
+static double linearize(struct __comp_state *__comp_inst, const double *joint, const double longer[LEGS],
+                        const Platform *at, double error[SIZE], double by_pose[SIZE][SIZE])
 {
     double largest = 0.0;
     int i;
 
     for (i = 0; i < LEGS; i++) {
-        double arm[3], leg[3], length = l(i);
+        double arm[3], leg[3], length = l(i) + longer[i];
         leg_at(__comp_inst, i, at, arm, leg);
         leg[0] += joint[i];
         error[i] = (leg[0] * leg[0] + leg[1] * leg[1] + leg[2] * leg[2] - length * length) / (2.0 * length);
@@ -180,6 +195,103 @@ static void move(Platform *at, const double step[SIZE])
             at->turn[row][column] = turned[row][column];
 }
 
+/* The joints for legs that are longer by some lengths; 0 if the pose is within reach. */
+static int place(struct __comp_state *__comp_inst, const Platform *at, const double longer[LEGS],
+                 double joint[LEGS])
+{
+    double arm[3], leg[3];
+    int i;
+
+    for (i = 0; i < LEGS; i++) {
+        double length = l(i) + longer[i], left;
+        leg_at(__comp_inst, i, at, arm, leg);
+        left = length * length - leg[1] * leg[1] - leg[2] * leg[2];
+        if (!(left >= 0.0))
+            return -1;
+        joint[i] = (branch(i) < 0.0 ? -1.0 : 1.0) * sqrt(left) - leg[0];
+    }
+    return 0;
+}
+
+static int is_corrected(struct __comp_state *__comp_inst)
+{
+    int i, found = 0;
+
+    for (i = 0; i < LEGS; i++)
+        found |= play(i) != 0.0 || compliance(i) != 0.0;
+    return found;
+}
+
+/* Where the weight pulls, a unit vector, and its moment about the platform's origin by a weight of 1 N. */
+static int load_at(struct __comp_state *__comp_inst, const Platform *at, double load[SIZE])
+{
+    double pull[3] = {weight_direction_x, weight_direction_y, weight_direction_z};
+    double centre[3] = {weight_centre_x, weight_centre_y, weight_centre_z}, acts[3];
+    double size = sqrt(pull[0] * pull[0] + pull[1] * pull[1] + pull[2] * pull[2]);
+    int i, row;
+
+    if (!(size > 0.0))
+        return -1;
+    if (weight_in_middle != 0.0) {
+        centre[0] = centre[1] = centre[2] = 0.0;
+        for (i = 0; i < LEGS; i++) {
+            centre[0] += b_x(i) / LEGS;
+            centre[1] += b_y(i) / LEGS;
+            centre[2] += b_z(i) / LEGS;
+        }
+    }
+    for (row = 0; row < 3; row++) {
+        load[row] = pull[row] / size;
+        acts[row] = at->turn[row][0] * centre[0] + at->turn[row][1] * centre[1] + at->turn[row][2] * centre[2];
+    }
+    load[3] = acts[1] * load[2] - acts[2] * load[1];
+    load[4] = acts[2] * load[0] - acts[0] * load[2];
+    load[5] = acts[0] * load[1] - acts[1] * load[0];
+    return 0;
+}
+
+/* By how much longer the legs are at a pose under the weight; where no forces hold it, longer is as before.
+ * Virtual work: with the joints held, the forces of the legs do on their lengths what the weight does. */
+static int stretch(struct __comp_state *__comp_inst, const Platform *at, double longer[LEGS])
+{
+    const double rigid[LEGS] = {0.0};
+    double joint[LEGS], force[SIZE], error[SIZE], by_pose[SIZE][SIZE], by_leg[SIZE][SIZE];
+    int i, row;
+
+    if (place(__comp_inst, at, rigid, joint) || load_at(__comp_inst, at, force))
+        return -1;
+    linearize(__comp_inst, joint, rigid, at, error, by_pose);
+    for (row = 0; row < SIZE; row++)
+        for (i = 0; i < LEGS; i++)
+            by_leg[row][i] = by_pose[i][row];
+    if (solve(by_leg, force))
+        return -1;
+    for (i = 0; i < LEGS; i++) {
+        double side = force[i] / SEATED;
+        side = side > 1.0 ? 1.0 : side < -1.0 ? -1.0 : side;
+        longer[i] = 0.5 * play(i) * side + compliance(i) * weight * force[i];
+    }
+    return 0;
+}
+
+/* The derivatives of the errors with those of the lengths under the weight. */
+static void add_stretching(struct __comp_state *__comp_inst, const Platform *at, const double longer[LEGS],
+                           double by_pose[SIZE][SIZE])
+{
+    int column, i;
+
+    for (column = 0; column < SIZE; column++) {
+        double step[SIZE] = {0.0}, there[LEGS];
+        Platform near = *at;
+        step[column] = SMALL_STEP;
+        move(&near, step);
+        if (stretch(__comp_inst, &near, there))
+            continue;
+        for (i = 0; i < LEGS; i++)
+            by_pose[i][column] -= (there[i] - longer[i]) / SMALL_STEP;
+    }
+}
+
 KINS_NOT_SWITCHABLE
 EXPORT_SYMBOL(kinematicsType);
 EXPORT_SYMBOL(kinematicsForward);
@@ -190,19 +302,26 @@ KINEMATICS_TYPE kinematicsType()
     return KINEMATICS_BOTH;
 }
 
-/* Newton's method from the pose in world. On failure world is as before. */
+/* Newton's method from the pose in world. On failure world is as before.
+ * Joints that no pose has while a leg goes from push to pull get, in the second half of the iterations, that
+ * of legs as long as they are at the start. */
 int kinematicsForward(const double *joint, EmcPose *world, const KINEMATICS_FORWARD_FLAGS *fflags,
                       KINEMATICS_INVERSE_FLAGS *iflags)
 {
     struct __comp_state *__comp_inst = the_only_one;
-    double error[SIZE], by_pose[SIZE][SIZE];
-    Platform at = {{world->tran.x, world->tran.y, world->tran.z}};
-    unsigned int done;
-    int row;
+    double error[SIZE], by_pose[SIZE][SIZE], longer[LEGS] = {0.0};
+    Platform at = {{world->tran.x, world->tran.y, world->tran.z}}, start;
+    unsigned int done, half = limit_iterations / 2;
+    int row, corrected = is_corrected(__comp_inst);
 
     turn_of(world, at.turn);
+    start = at;
     for (done = 0; done <= limit_iterations; done++) {
-        if (linearize(__comp_inst, joint, &at, error, by_pose) <= convergence_criterion) {
+        if (corrected && done == half)
+            at = start;
+        if (corrected && done <= half)
+            stretch(__comp_inst, &at, longer);
+        if (linearize(__comp_inst, joint, longer, &at, error, by_pose) <= convergence_criterion) {
             world->tran.x = at.origin[0];
             world->tran.y = at.origin[1];
             world->tran.z = at.origin[2];
@@ -213,8 +332,14 @@ int kinematicsForward(const double *joint, EmcPose *world, const KINEMATICS_FORW
         }
         for (row = 0; row < SIZE; row++)
             error[row] = -error[row];
-        if (solve(by_pose, error))
-            break;
+        if (corrected && done < half)
+            add_stretching(__comp_inst, &at, longer, by_pose);
+        if (solve(by_pose, error)) {
+            if (!corrected || done >= half)
+                break;
+            done = half - 1;
+            continue;
+        }
         move(&at, error);
     }
     last_iterations = done;
@@ -227,19 +352,14 @@ int kinematicsInverse(const EmcPose *world, double *joint, const KINEMATICS_INVE
 {
     struct __comp_state *__comp_inst = the_only_one;
     Platform at = {{world->tran.x, world->tran.y, world->tran.z}};
-    double arm[3], leg[3], found[LEGS];
+    double longer[LEGS] = {0.0}, found[LEGS];
     int i;
 
     turn_of(world, at.turn);
-    for (i = 0; i < LEGS; i++) {
-        double left;
-        leg_at(__comp_inst, i, &at, arm, leg);
-        left = l(i) * l(i) - leg[1] * leg[1] - leg[2] * leg[2];
-        if (!(left >= 0.0)) {
-            inv_kins_fail = 1;
-            return -1;
-        }
-        found[i] = (branch(i) < 0.0 ? -1.0 : 1.0) * sqrt(left) - leg[0];
+    if ((is_corrected(__comp_inst) && stretch(__comp_inst, &at, longer)) ||
+        place(__comp_inst, &at, longer, found)) {
+        inv_kins_fail = 1;
+        return -1;
     }
     for (i = 0; i < LEGS; i++)
         joint[i] = found[i];

@@ -3,6 +3,7 @@
     setp genhexkins.base.0.x -22.950
 
 Where the value is a variable of the INI file (``[GENHEXKINS]BASE0X``), that is the config.
+:mod:`~hexacell.config.linuxcnc_legs` says which pins may be beside those of the geometry.
 """
 
 import re
@@ -17,7 +18,8 @@ from pydantic import Field
 
 from hexacell.cell.fields import Text
 from hexacell.config.interface import NumberToken, token_error
-from hexacell.config.keyed_config import KeyedConfig, KeyedOptions, options_of
+from hexacell.config.keyed_config import KeyedOptions, options_of
+from hexacell.config.linuxcnc_legs import LegCorrections
 from hexacell.errors import FileError
 from hexacell.kinematics.parameters import GeometricParameter, ParameterSet
 
@@ -34,7 +36,7 @@ class HalPinsOptions(KeyedOptions):
     component: Text = Field("genhexkins", min_length=1)
 
 
-class HalPins(KeyedConfig):
+class HalPins(LegCorrections):
     """A :class:`~hexacell.config.interface.ConfigFormat`; raises ``UsageError`` for options."""
 
     def __init__(
@@ -42,6 +44,10 @@ class HalPins(KeyedConfig):
     ) -> None:
         options = options_of(HalPinsOptions, "linuxcnc-hal", given)
         super().__init__(parameters, options, partial(_pin, options.component), HalText, is_part=is_part)
+        self._component = options.component
+
+    def _key_of_pin(self, pin: str) -> str:
+        return f"{self._component}.{pin}"
 
 
 def _pin(component: str, parameter: GeometricParameter) -> str:

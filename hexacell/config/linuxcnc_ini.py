@@ -6,7 +6,8 @@
     L6 = 700.0
 
 HAL reads them by ``setp hexaglidekins.s1x [HEXAGLIDE]S1X``. Limits of joints and axes in the same file
-(``[JOINT_0] MIN_LIMIT``, ``[AXIS_X] MAX_LIMIT``) hold as well, and ``[JOINT_0] BACKLASH``.
+(``[JOINT_0] MIN_LIMIT``, ``[AXIS_X] MAX_LIMIT``) hold as well, ``[JOINT_0] BACKLASH``, and ``PLAY1`` and
+others of :mod:`~hexacell.config.linuxcnc_legs` in the section.
 
 To what it sends a motor LinuxCNC adds half of the joint's ``BACKLASH`` while the joint moves up, takes as
 much away while it moves down, and keeps it while the joint stands; what it reports is without that
@@ -41,7 +42,8 @@ from hexacell.config.interface import (
     token_error,
     write_number,
 )
-from hexacell.config.keyed_config import KeyedConfig, KeyedOptions, NumberLookup, options_of
+from hexacell.config.keyed_config import KeyedOptions, NumberLookup, options_of
+from hexacell.config.linuxcnc_legs import LegCorrections
 from hexacell.errors import FileError
 from hexacell.kinematics.corrections import CorrectionKind, Corrections, Six
 from hexacell.kinematics.parameters import LEGS, ParameterSet
@@ -54,10 +56,10 @@ class LinuxcncIniOptions(KeyedOptions):
     section: Text = Field("GEOMETRY", min_length=1)
 
 
-class LinuxcncIni(KeyedConfig):
+class LinuxcncIni(LegCorrections):
     """A :class:`~hexacell.config.interface.ConfigFormat`; raises ``UsageError`` for options."""
 
-    holds = frozenset({CorrectionKind.BACKLASH})
+    holds = frozenset(CorrectionKind)
 
     def __init__(
         self, parameters: ParameterSet, given: Mapping[str, Any], *, is_part: bool = False
@@ -73,24 +75,24 @@ class LinuxcncIni(KeyedConfig):
         )
 
     def read(self, text: str, source: Path | None) -> ConfigPart:
-        """As any keyed config, with the backlash of the joints; raises ``FileError`` with the line."""
+        """As those of legs, with the backlash of the joints; raises ``FileError`` with the line."""
         part, ini = super().read(text, source), IniText(text, source, "")
         backlash = cast("Six", tuple(_backlash(ini, joint, self._unit_mm) for joint in JOINTS))
         has_place = all(ini.has_section(joint) and not ini.has(f"{joint}/{COMP_FILE}") for joint in JOINTS)
-        holds = self.holds if has_place else frozenset[CorrectionKind]()
-        return replace(part, corrections=Corrections(backlash), holds=holds)
+        holds = part.holds | ({CorrectionKind.BACKLASH} if has_place else set())
+        return replace(part, corrections=replace(part.corrections, backlash=backlash), holds=holds)
 
     def rewrite(
         self, text: str, values: Mapping[str, float], corrections: Corrections | None = None
     ) -> str:
-        """As any keyed config, with another backlash, if that is given.
+        """As those of legs, with another backlash, if that is given.
 
         A variable that is absent becomes the last one of its section.
 
         Raises:
             FileError: a number reads back as another one.
         """
-        new = super().rewrite(text, values)
+        new = super().rewrite(text, values, corrections)
         joints = zip(JOINTS, corrections.backlash if corrections is not None else (), strict=False)
         for joint, wanted in joints:
             new = _with_backlash(IniText(new, None, ""), joint, self._unit_mm, wanted)
@@ -100,6 +102,11 @@ class LinuxcncIni(KeyedConfig):
                     action="Nothing was written; please report this with the config",
                 )
         return new
+
+    def _key_of_pin(self, pin: str) -> str:
+        """``PLAY1`` for ``play.0``, ``WEIGHT_CENTRE_X`` for ``weight-centre.x``."""
+        name, _, part = pin.upper().replace("-", "_").partition(".")
+        return f"{name}{int(part) + 1}" if part.isdecimal() else f"{name}_{part}".rstrip("_")
 
 
 SEPARATOR = "/"

@@ -37,9 +37,6 @@ from procedures.devices.device_set import Devices
 from procedures.guards.polling import POLL_PAUSE_S
 from procedures.run.trips import Guard, Trip
 
-NOT_KNOWN = 0.2
-"""Share of what the controller adds to its joints that may differ: it computes forces in its own way."""
-
 ATTEMPTS = 5
 """Reports are read one after the other, and are read again if a joint moved a little in between."""
 
@@ -132,12 +129,12 @@ def _joints_of(
     """Joint variables (6,), mm, of a pose, NaN if it is out of reach; what its tolerance does to them."""
     poses = PoseBatch.of([pose])
     states = config.geometry, config.branch, config.corrections
-    [joints], [added] = commanded_joints(mechanism, *states, poses)
+    [joints], [unknown] = commanded_joints(mechanism, *states, poses)
     derivatives = mechanism.derivatives(config.geometry, poses, np.nan_to_num(joints)[None])
     with np.errstate(divide="ignore", invalid="ignore"):
         slopes = np.linalg.norm(derivatives.pose[0, :, :3], axis=-1) / np.abs(derivatives.joints[0])
     rounding = position_mm * np.maximum(1.0, np.nan_to_num(slopes, nan=1.0, posinf=1.0))
-    return joints, rounding + NOT_KNOWN * np.abs(added)
+    return joints, rounding + unknown
 
 
 def _excess(differences: Array, tolerances: Array) -> Array:

@@ -10,6 +10,7 @@ from hexacell.cell.loader import load_cell
 from hexacell.kinematics.mechanism import inverse_kinematics, joint_zeros
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.robot.model import config_layout
+from tests.configs.test_hexaglidekins import LOADED, loaded_joints
 from tests.linuxcnc.server_client import ServerClient
 from tests.waiting import wait_until
 
@@ -47,6 +48,14 @@ def with_screws(machine) -> None:
     cell.write_text(f"{cell.read_text()}\n[robot.screws]\nlead_mm = 10.0\n{stated}\n")
 
 
+def with_loaded_legs(machine) -> None:
+    """Its legs have play and yield, as its config says."""
+    cell = load_cell(machine.folder / "cell.toml")
+    layout, path = config_layout(cell.settings), cell.config_path
+    [text] = layout.rewrite([path.read_text()], layout.read(path).geometry, LOADED)
+    path.write_text(text)
+
+
 def is_at(client: ServerClient, commanded: np.ndarray) -> bool:
     """Whether the pose that LinuxCNC shows is the commanded one, but for its rounding."""
     shown = np.array(client.get("abs_act_pos"))
@@ -75,6 +84,7 @@ def has_ended(client: ServerClient, commanded: np.ndarray) -> bool:
     ("name", "height", "fails", "changes", "count"),
     [
         pytest.param(*HEXAGLIDE, (), POSES // 5, id="hexaglide"),
+        pytest.param(*HEXAGLIDE, (with_loaded_legs,), POSES // 5, id="loaded legs"),
         pytest.param(*HEXAPOD, (), POSES // 5, id="hexapod"),
         pytest.param(*HEXAPOD, (with_screws,), POSES // 10, id="screws"),
         pytest.param(*HEXAGLIDE, (), POSES, id="hexaglide, all", marks=pytest.mark.slow),
@@ -103,6 +113,8 @@ def test_random_poses_have_the_same_joints(request, name, height, fails, changes
             joints.append(client.get("joint_pos"))
             reached.append(client.get("abs_act_pos"))
     own = inverse_kinematics(mechanism, controller.geometry, controller.branch, PoseBatch.of(poses))
+    if not controller.corrections.are_none:
+        own = loaded_joints(mechanism, controller, PoseBatch.of(poses))
     if cell.settings.controller.joints_include_zeros:
         own += joint_zeros(mechanism, controller.geometry)
     assert np.abs(own - np.array(joints)).max() <= AS_SHOWN

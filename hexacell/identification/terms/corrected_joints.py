@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hexacell.identification.placement import Placement
+from hexacell.identification.placement import Placement, leg_forces
 from hexacell.identification.terms.compliance import compliance
 from hexacell.identification.terms.play import play
 from hexacell.kinematics.corrections import Corrections
@@ -11,29 +11,40 @@ from hexacell.kinematics.mechanism import Branch, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
+NOT_KNOWN = 0.2
+"""Share of what a controller adds to its joints that may differ: it computes forces in its own way."""
+
+BETWEEN = 0.01
+"""Force of a leg, by a weight of one newton, with less of which a controller whose joints must not jump may
+have the leg anywhere between both ends of its play."""
+
 
 def commanded_joints(
     mechanism: Mechanism, geometry: Geometry, branch: Branch, corrections: Corrections, poses: PoseBatch
 ) -> tuple[Array, Array]:
-    """What a controller commands its joints to (n, 6) for some poses, and how much of it corrects.
+    """What a controller commands its joints to (n, 6) for some poses, and what of it may differ.
 
     NaN for poses that are out of reach.
     """
     joints = mechanism.inverse(geometry, branch, poses)
     if corrections.are_none:
         return joints, np.zeros_like(joints)
-    added = _added(Placement(mechanism, geometry, poses, np.nan_to_num(joints)), corrections)
-    return joints + added, added
+    at = Placement(mechanism, geometry, poses, np.nan_to_num(joints))
+    added, unseated = _added(at, corrections)
+    return joints + added, NOT_KNOWN * np.abs(added) + unseated
 
 
-def _added(at: Placement, corrections: Corrections) -> Array:
+def _added(at: Placement, corrections: Corrections) -> tuple[Array, Array]:
     """What play and compliance add to the joint variables (n, 6), in their unit, to first order.
 
-    Half a backlash is added beside the joint variables, which do not show it.
+    Half a backlash is added beside the joint variables, which do not show it. Beside that comes the whole
+    play of legs that hardly anything pulls or pushes.
     """
     direction, centre = np.array(corrections.weight_direction), corrections.weight_centre_mm
     acts = direction, None if centre is None else np.array(centre)
     unknown = np.zeros_like(at.joints)
     errors = play(1.0, *acts).leg_errors(at, unknown) * corrections.play_mm
     yielding = compliance(1.0, corrections.weight_n, *acts).leg_errors(at, unknown)
-    return -at.as_joints(errors + yielding * corrections.compliance_um_n)
+    is_between = np.abs(leg_forces(at, *acts)) < BETWEEN
+    unseated = np.abs(at.as_joints(is_between * np.array(corrections.play_mm)))
+    return -at.as_joints(errors + yielding * corrections.compliance_um_n), unseated

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from hexacell.cell.loader import load_cell
 from hexacell.config.change import ConfigChange, propose
 from hexacell.config.layout import ConfigLayout, FormatOfFile, fingerprint
+from hexacell.config.linuxcnc_hal import HalPins
 from hexacell.config.linuxcnc_ini import LinuxcncIni
 from hexacell.config.toml_format import NativeToml
 from hexacell.config.write_back import commit, rollback
@@ -20,6 +21,7 @@ from hexacell.errors import FileError
 from hexacell.kinematics.corrections import NO_CORRECTIONS, CorrectionKind, Corrections
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.gough_stewart import GOUGH_STEWART_PARAMETERS
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.robot.model import config_layout
 from hexacell.storage.toml_document import TomlDocument
 from hexacell.text.config_changes import correction_lines
@@ -197,7 +199,7 @@ def test_linuxcnc_gets_backlash_as_the_last_variable_of_each_joint(tmp_path: Pat
     layout, paths = linuxcnc("linuxcnc-hexapod")
     texts = [path.read_text().replace("\n", end) for path in paths]
     geometry = layout.read(*paths).geometry
-    assert layout.holds == layout.read(*paths).holds == {CorrectionKind.BACKLASH}
+    assert layout.read(*paths).holds == {CorrectionKind.BACKLASH}
     assert layout.rewrite(texts, geometry, NO_CORRECTIONS) == tuple(texts)
     new = layout.rewrite(texts, geometry, LAGGING)
     assert read(layout, *new) == LAGGING
@@ -217,9 +219,80 @@ def test_linuxcnc_gets_backlash_as_the_last_variable_of_each_joint(tmp_path: Pat
 def test_what_linuxcnc_would_not_use_is_no_place_for_backlash() -> None:
     layout, paths = linuxcnc("linuxcnc-hexaglide")
     found = layout.read(*paths)
-    assert not found.holds, "an included file without joints"
+    assert found.holds == {CorrectionKind.PLAY, CorrectionKind.COMPLIANCE}, (
+        "an included file without joints"
+    )
     with pytest.raises(FileError, match=r"no place for corrections of backlash.*further_files"):
         layout.rewrite([path.read_text() for path in paths], found.geometry, LAGGING)
+
+
+LEGS_TEXT = """\
+[HEXAGLIDE]
+PLAY1 = 0.1
+COMPLIANCE6 = 3e-4
+WEIGHT = 98.1
+WEIGHT_DIRECTION_Z = -9.81
+WEIGHT_IN_MIDDLE = 1
+"""
+
+
+def legs_files(unit_mm: float) -> dict[str, tuple[ConfigLayout, str]]:
+    """A HAL and an INI file with pins, or variables, for play and compliance, all of them."""
+    hal = (CONFIGS / "linuxcnc-hexaglide" / "hexaglide.hal").read_text()
+    ini = (CONFIGS / "linuxcnc-hexaglide" / "geometry.inc").read_text()
+    values = dict(re.findall(r"(?m)^(\w+) = (\S+)$", ini)) | dict(re.findall(r"(\w+) = (\S+)", LEGS_TEXT))
+    given = {"unit_mm": unit_mm, "branch": [-1, -1, -1, 1, 1, 1]}
+    formats = {
+        "ini": LinuxcncIni(HEXAGLIDE_PARAMETERS, given | {"section": "HEXAGLIDE"}),
+        "hal": HalPins(HEXAGLIDE_PARAMETERS, given | {"component": "hexaglidekins"}),
+    }
+    texts = {
+        "ini": re.sub(r"(?m)^(\w+) = \S+$", lambda one: f"{one[1]} = {values[one[1]]}", ini),
+        "hal": re.sub(r"\[HEXAGLIDE\](\w+)", lambda one: values[one[1]], hal),
+    }
+    return {
+        name: (ConfigLayout(HEXAGLIDE_PARAMETERS, (FormatOfFile(name, form),)), texts[name])
+        for name, form in formats.items()
+    }
+
+
+@given(drawn, drawn, st.sampled_from(["ini", "hal"]), st.sampled_from([1.0, 25.4]))
+def test_a_component_that_reads_them_gets_play_and_compliance(
+    one: Corrections, other: Corrections, name: str, unit_mm: float
+) -> None:
+    layout, text = legs_files(unit_mm)[name]
+    [reader] = layout.formats
+    part = reader.reader.read(text, None)
+    there = part.corrections
+    assert (there.play_mm[0], there.compliance_um_n[5]) == pytest.approx((0.1 * unit_mm, 0.3 * unit_mm))
+    assert (there.weight_n, there.weight_direction, there.weight_centre_mm) == (
+        98.1,
+        (0.0, 0.0, -1.0),
+        None,
+    )
+    assert reader.reader.rewrite(text, part.values, there) == text
+    for wanted in (one, other):
+        legs = replace(wanted, backlash=NO_CORRECTIONS.backlash)
+        new = reader.reader.rewrite(text, part.values, legs)
+        assert_same(read(layout, new), legs)
+        assert reader.reader.rewrite(new, part.values, legs) == new
+        assert re.sub(r" [-+.\de]+\n", "", new) == re.sub(r" [-+.\de]+\n", "", text)
+        text = new
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ("PLAY1 = 0.1", "PLAY1 = 5.1", "PLAY1 is 5.1"),
+        ("COMPLIANCE6 = 3e-4", "COMPLIANCE6 = -3e-4", "COMPLIANCE6 is -3e-4"),
+        ("Z = -9.81", "Z = 0.0", "the weight has no direction"),
+        ("PLAY3 = 0.0\n", "", "there is no PLAY3"),
+    ],
+)
+def test_what_the_component_must_not_get_is_refused(old: str, new: str, problem: str) -> None:
+    layout, text = legs_files(1.0)["ini"]
+    with pytest.raises(FileError, match=problem):
+        read(layout, text.replace(old, new))
 
 
 INI = LinuxcncIni(GOUGH_STEWART_PARAMETERS, ZEROS | {"unit_mm": 25.4}, is_part=True)

@@ -1,0 +1,154 @@
+"""Play and compliance of legs in LinuxCNC's files, for a kinematics component that corrects them.
+
+    PLAY1 = 0.1                  setp hexaglidekins.play.0 0.1
+    COMPLIANCE1 = 0.0003         setp hexaglidekins.compliance.0 0.0003
+    WEIGHT = 100.0
+    WEIGHT_DIRECTION_Z = -1.0    in the base frame
+    WEIGHT_IN_MIDDLE = 0         0: in its centre, else in the middle of the joints on the platform
+    WEIGHT_CENTRE_Z = 80.0       in the platform frame
+
+Lengths are in the config's unit, compliance in that of length a newton, the weight in newtons. Where none
+of the numbers is there no component reads them, and none is added; where some are, all must be.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import ceil, hypot, log10, nan
+from pathlib import Path
+from typing import cast
+
+from hexacell.cell.fields import LARGEST_NUMBER
+from hexacell.config.interface import (
+    LARGEST_COMPLIANCE_UM_N,
+    LARGEST_PLAY_MM,
+    ConfigPart,
+    number_of,
+    replace_tokens,
+    token_error,
+    write_number,
+)
+from hexacell.config.keyed_config import KeyedConfig, NumberLookup
+from hexacell.errors import FileError
+from hexacell.kinematics.corrections import CorrectionKind, Corrections, Six, Three
+from hexacell.kinematics.parameters import LEGS
+
+UM = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class _Number:
+    """What one number may be, in the unit of the corrections, of which the config's is a multiple."""
+
+    lowest: float = -LARGEST_NUMBER
+    highest: float = LARGEST_NUMBER
+    unit: float = 1.0
+    decimals: int = 6
+
+    def written(self, value: float) -> str:
+        """It in the config's unit, with as many decimals more as that is larger."""
+        return write_number(value / self.unit, self.decimals + max(0, ceil(log10(self.unit))))
+
+
+def _numbers(unit_mm: float) -> Iterator[tuple[str, _Number]]:
+    """The pins of the component, in the order of :meth:`LegCorrections._values`."""
+    play = _Number(-LARGEST_PLAY_MM, LARGEST_PLAY_MM, unit_mm)
+    compliance = _Number(0.0, LARGEST_COMPLIANCE_UM_N, unit_mm / UM)
+    yield from ((f"play.{leg}", play) for leg in range(LEGS))
+    yield from ((f"compliance.{leg}", compliance) for leg in range(LEGS))
+    yield "weight", _Number(0.0)
+    yield from ((f"weight-direction.{axis}", _Number(decimals=9)) for axis in "xyz")
+    yield "weight-in-middle", _Number(0.0, 1.0)
+    yield from ((f"weight-centre.{axis}", _Number(unit=unit_mm)) for axis in "xyz")
+
+
+class LegCorrections(KeyedConfig):
+    """A config of LinuxCNC that may have these beside a geometry, or beside a part of it."""
+
+    holds = frozenset({CorrectionKind.PLAY, CorrectionKind.COMPLIANCE})
+
+    def read(self, text: str, source: Path | None) -> ConfigPart:
+        """As any keyed config, with play and compliance if the text has a place for them.
+
+        Raises:
+            FileError: with the line of a number that is absent, there twice, none, or not physical.
+        """
+        part, lookup = super().read(text, source), self._open(text, source)
+        if not any(map(lookup.has, self._pins)):
+            return part
+        values = [self._number(lookup, key, source) for key in self._pins]
+        legs, (weight, *direction, in_middle), centre = values[:12], values[12:17], values[17:]
+        if not (length := hypot(*direction)):
+            token = lookup.number(self._directions[0])
+            raise token_error(token, "the weight has no direction", source, "State it")
+        found = Corrections(
+            play_mm=cast("Six", tuple(legs[:LEGS])),
+            compliance_um_n=cast("Six", tuple(legs[LEGS:])),
+            weight_n=weight,
+            weight_direction=cast("Three", tuple(one / length for one in direction)),
+            weight_centre_mm=None if in_middle else cast("Three", tuple(centre)),
+        )
+        return replace(part, corrections=found, holds=LegCorrections.holds)
+
+    def rewrite(
+        self, text: str, values: Mapping[str, float], corrections: Corrections | None = None
+    ) -> str:
+        """As any keyed config, with other numbers of these, if they are given and have a place.
+
+        Raises:
+            FileError: a number reads back as another one.
+        """
+        new = super().rewrite(text, values)
+        held = LegCorrections.read(self, new, None)
+        if corrections is None or not held.holds:
+            return new
+        wanted = self._values(corrections)
+        changed = self._different(self._values(held.corrections), wanted, of_last_decimal=0.5)
+        if changed & {*self._directions}:
+            # A direction that is no unit vector in the text would change its meaning number by number.
+            changed |= {*self._directions}
+        lookup = self._open(new, None)
+        tokens = {lookup.number(key): self._pins[key].written(wanted[key]) for key in changed}
+        new = replace_tokens(new, tokens)
+        after = self._values(LegCorrections.read(self, new, None).corrections)
+        if wrong := sorted(self._different(after, wanted, of_last_decimal=2.0)):
+            raise FileError(
+                f"the new corrections read back with another {wrong[0]}",
+                action="Nothing was written; please report this with the config",
+            )
+        return new
+
+    def _key_of_pin(self, pin: str) -> str:
+        """The key of a pin of the component, by its name without that of the component."""
+        raise NotImplementedError
+
+    @cached_property
+    def _pins(self) -> Mapping[str, _Number]:
+        return {self._key_of_pin(pin): number for pin, number in _numbers(self._unit_mm)}
+
+    @cached_property
+    def _directions(self) -> tuple[str, ...]:
+        return tuple(self._key_of_pin(f"weight-direction.{axis}") for axis in "xyz")
+
+    def _number(self, lookup: NumberLookup, key: str, source: Path | None) -> float:
+        token, number = lookup.number(key), self._pins[key]
+        value = number.unit * number_of(token, source)
+        if not number.lowest <= value <= number.highest:
+            limits = f"{number.lowest / number.unit:g} to {number.highest / number.unit:g}"
+            raise token_error(token, f"{key} is {token.text}", source, f"It must be from {limits}")
+        return value
+
+    def _values(self, corrections: Corrections) -> Mapping[str, float]:
+        """The numbers by their keys; without those of a centre that is not stated."""
+        numbers = [*corrections.play_mm, *corrections.compliance_um_n, corrections.weight_n]
+        numbers += [*corrections.weight_direction, float(corrections.weight_centre_mm is None)]
+        return dict(zip(self._pins, [*numbers, *(corrections.weight_centre_mm or ())], strict=False))
+
+    def _different(
+        self, some: Mapping[str, float], others: Mapping[str, float], *, of_last_decimal: float
+    ) -> set[str]:
+        def is_close(key: str, value: float) -> bool:
+            tolerance = of_last_decimal * 10.0 ** -self._pins[key].decimals
+            return abs(some.get(key, nan) - value) <= tolerance
+
+        return {key for key, value in others.items() if not is_close(key, value)}

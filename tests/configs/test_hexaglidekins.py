@@ -1,0 +1,112 @@
+"""The mathematics of LinuxCNC's kinematics component, compiled as plain C, against the program's own."""
+
+import ctypes
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drivers.controllers.linuxcnc.set_pins import _wanted
+from hexacell.cell.loader import load_cell
+from hexacell.config.interface import ControllerGeometry
+from hexacell.config.linuxcnc_ini import IniText
+from hexacell.identification.placement import Placement, leg_forces
+from hexacell.kinematics.corrections import Corrections
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.rotations import Array
+from hexacell.robot.model import config_layout
+from tests.cli.cell_folder import CONFIGS
+
+SIX = ctypes.c_double * 6
+FOLDER = CONFIGS / "linuxcnc-hexaglide"
+SEATED = 0.005
+LOADED = Corrections(
+    play_mm=(0.1, 0.08, -0.02, 0.1, 0.05, 0.09),
+    compliance_um_n=(0.3, 0.36, 0.3, 0.24, 0.0, 0.3),
+    weight_n=100.0,
+    weight_direction=(0.6, 0.0, -0.8),
+    weight_centre_mm=(3.0, -20.0, 40.0),
+)
+# What halcompile and LinuxCNC's headers declare.
+STUBS = """
+#include <math.h>
+typedef struct { struct { double x, y, z; } tran; double a, b, c, u, v, w; } EmcPose;
+typedef int KINEMATICS_TYPE, KINEMATICS_FORWARD_FLAGS, KINEMATICS_INVERSE_FLAGS;
+#define KINEMATICS_BOTH 3
+#define KINS_NOT_SWITCHABLE
+#define EXPORT_SYMBOL(name)
+#define EXTRA_SETUP() int setup(struct __comp_state *__comp_inst)
+"""
+
+
+def loaded_joints(mechanism: Mechanism, controller: ControllerGeometry, poses: PoseBatch) -> Array:
+    """Joints (n, 6) of legs as long as the model's forces make them, each pose by its own geometry."""
+    corrections, geometry = controller.corrections, controller.geometry
+    joints = mechanism.inverse(geometry, controller.branch, poses)
+    direction, centre = np.array(corrections.weight_direction), corrections.weight_centre_mm
+    at = Placement(mechanism, geometry, poses, joints)
+    forces = leg_forces(at, direction, None if centre is None else np.array(centre))
+    longer = 1e-3 * np.array(corrections.compliance_um_n) * corrections.weight_n * forces
+    longer += 0.5 * np.array(corrections.play_mm) * np.clip(forces / SEATED, -1.0, 1.0)
+    for row, changes in enumerate(mechanism.parameters.changes("l", longer.T).T):
+        changed = Geometry(mechanism.parameters, geometry.vector + changes)
+        joints[row] = mechanism.inverse(changed, controller.branch, poses[np.array([row])])[0]
+    return joints
+
+
+@pytest.fixture
+def compiled(tmp_path: Path) -> tuple[ctypes.CDLL, Any]:
+    """The component and its pins, as they are before HAL sets them."""
+    if shutil.which("cc") is None:
+        pytest.skip("there is no C compiler here")
+    head, code = (FOLDER / "hexaglidekins.comp").read_text().split("\n;;\n")
+    declared = re.findall(r"(?m)^pin (?:in|out) \w+ ([\w.#-]+)(\[6\])?(?: = ([-.\de]+))?", head)
+    pins = [(re.sub(r"[-.]", "_", name.replace(".#", "")), six, value) for name, six, value in declared]
+    state = "".join(f"double {name}{six}; " for name, six, _ in pins)
+    macro = {"": "#define {0} (__comp_inst->{0})\n", "[6]": "#define {0}(i) (__comp_inst->{0}[i])\n"}
+    macros = "".join(macro[six].format(name) for name, six, _ in pins)
+    source, library = tmp_path / "kinematics.c", tmp_path / "kinematics.so"
+    code = re.sub(r'#include ".*"', "", code)
+    source.write_text(f"{STUBS}struct __comp_state {{ {state}}};\n{macros}{code}")
+    options = ["-O2", "-Wall", "-Werror", "-shared", "-fPIC"]
+    subprocess.run(["cc", *options, "-o", library, source, "-lm"], check=True)
+    fields = [(name, ctypes.c_double * 6 if six else ctypes.c_double) for name, six, _ in pins]
+    values = {name: float(value) for name, _, value in pins if value}
+    return ctypes.CDLL(str(library)), type("Pins", (ctypes.Structure,), {"_fields_": fields})(**values)
+
+
+@pytest.mark.parametrize("in_middle", [True, False])
+def test_joints_of_legs_under_a_weight_and_the_way_back(compiled, in_middle: bool) -> None:
+    library, pins = compiled
+    cell = load_cell(FOLDER / "cell.toml")
+    layout, paths, mechanism = config_layout(cell.settings), cell.config_paths, cell.settings.mechanism
+    corrections = replace(LOADED, weight_centre_mm=None) if in_middle else LOADED
+    controller = layout.read(*paths)
+    [text] = layout.rewrite([paths[0].read_text()], controller.geometry, corrections)
+    for pin, value in _wanted([FOLDER / "hexaglide.hal"], [IniText(text, None, "")]):
+        name, _, rest = pin.removeprefix("hexaglidekins.").replace("-", "_").partition(".")
+        place, _, axis = rest.partition(".")
+        if place.isdecimal():
+            getattr(pins, f"{name}_{axis}".rstrip("_"))[int(place)] = float(value)
+        else:
+            setattr(pins, f"{name}_{rest}".rstrip("_"), float(value))
+    library.setup(ctypes.byref(pins))
+    rows = np.random.default_rng(38).uniform(-1.0, 1.0, (1000, 6)) * (60, 60, 60, 20, 20, 20)
+    rows[:, 2] += 550.0
+    poses = PoseBatch.of([Pose(*row) for row in rows.tolist()])
+    wanted = loaded_joints(mechanism, replace(controller, corrections=corrections), poses)
+    assert np.abs(wanted - mechanism.inverse(controller.geometry, controller.branch, poses)).max() > 0.1
+    for row, expected in zip(rows, wanted, strict=True):
+        pose, joints = (ctypes.c_double * 9)(*row), SIX()
+        assert library.kinematicsInverse(pose, joints, None, None) == 0
+        assert np.array(joints) == pytest.approx(expected, abs=1e-9)
+        pose[0], pose[4] = pose[0] + 2.0, pose[4] - 1.0
+        assert library.kinematicsForward(joints, pose, None, None) == 0
+        assert np.array(pose)[:6] == pytest.approx(row, abs=1e-8)

@@ -6,7 +6,6 @@ import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +23,6 @@ from hexacell.kinematics.rotations import Array
 from hexacell.robot.model import config_layout
 from tests.cli.cell_folder import CONFIGS
 
-SIX = ctypes.c_double * 6
 FOLDER = CONFIGS / "linuxcnc-hexaglide"
 SEATED = 0.005
 LOADED = Corrections(
@@ -34,7 +32,7 @@ LOADED = Corrections(
     weight_direction=(0.6, 0.0, -0.8),
     weight_centre_mm=(3.0, -20.0, 40.0),
 )
-# What halcompile and LinuxCNC's headers declare.
+# What LinuxCNC's headers and halcompile declare, beside the pins.
 STUBS = """
 #include <math.h>
 typedef struct { struct { double x, y, z; } tran; double a, b, c, u, v, w; } EmcPose;
@@ -61,52 +59,42 @@ def loaded_joints(mechanism: Mechanism, controller: ControllerGeometry, poses: P
     return joints
 
 
-@pytest.fixture
-def compiled(tmp_path: Path) -> tuple[ctypes.CDLL, Any]:
-    """The component and its pins, as they are before HAL sets them."""
+def compiled(ini: str, folder: Path) -> ctypes.CDLL:
+    """The component, with its pins as HAL sets them to variables of an INI text."""
     if shutil.which("cc") is None:
         pytest.skip("there is no C compiler here")
+    set_pins = _wanted([FOLDER / "hexaglide.hal"], [IniText(ini, None, "")])
+    pins = {pin.removeprefix("hexaglidekins."): number for pin, number in set_pins}
     head, code = (FOLDER / "hexaglidekins.comp").read_text().split("\n;;\n")
-    declared = re.findall(r"(?m)^pin (?:in|out) \w+ ([\w.#-]+)(\[6\])?(?: = ([-.\de]+))?", head)
-    pins = [(re.sub(r"[-.]", "_", name.replace(".#", "")), six, value) for name, six, value in declared]
-    state = "".join(f"double {name}{six}; " for name, six, _ in pins)
-    macro = {"": "#define {0} (__comp_inst->{0})\n", "[6]": "#define {0}(i) (__comp_inst->{0}[i])\n"}
-    macros = "".join(macro[six].format(name) for name, six, _ in pins)
-    source, library = tmp_path / "kinematics.c", tmp_path / "kinematics.so"
-    code = re.sub(r'#include ".*"', "", code)
-    source.write_text(f"{STUBS}struct __comp_state {{ {state}}};\n{macros}{code}")
+    source, library = folder / "kinematics.c", folder / "kinematics.so"
+    text = STUBS
+    for pin, six, value in re.findall(r"(?m)^pin \w+ \w+ ([\w.#-]+)(\[6\])?(?: = (\S+))?", head):
+        every = [pins.get(pin.replace("#", str(leg)), value or "0") for leg in range(6)]
+        name = re.sub(r"[-.]", "_", pin.replace(".#", ""))
+        text += f"static double {name}_[6] = {{{', '.join(every)}}};\n"
+        text += f"#define {name}{'(leg)' if six else ''} {name}_[{'leg' if six else 0}]\n"
+    source.write_text(text + re.sub(r'#include ".*"', "", code))
     options = ["-O2", "-Wall", "-Werror", "-shared", "-fPIC"]
     subprocess.run(["cc", *options, "-o", library, source, "-lm"], check=True)
-    fields = [(name, ctypes.c_double * 6 if six else ctypes.c_double) for name, six, _ in pins]
-    values = {name: float(value) for name, _, value in pins if value}
-    return ctypes.CDLL(str(library)), type("Pins", (ctypes.Structure,), {"_fields_": fields})(**values)
+    return ctypes.CDLL(str(library))
 
 
-@pytest.mark.parametrize("in_middle", [True, False])
-def test_joints_of_legs_under_a_weight_and_the_way_back(compiled, in_middle: bool) -> None:
-    library, pins = compiled
+@pytest.mark.parametrize("corrections", [LOADED, replace(LOADED, weight_centre_mm=None)])
+def test_joints_of_legs_under_a_weight_and_the_way_back(tmp_path: Path, corrections: Corrections) -> None:
     cell = load_cell(FOLDER / "cell.toml")
     layout, paths, mechanism = config_layout(cell.settings), cell.config_paths, cell.settings.mechanism
-    corrections = replace(LOADED, weight_centre_mm=None) if in_middle else LOADED
     controller = layout.read(*paths)
-    [text] = layout.rewrite([paths[0].read_text()], controller.geometry, corrections)
-    for pin, value in _wanted([FOLDER / "hexaglide.hal"], [IniText(text, None, "")]):
-        name, _, rest = pin.removeprefix("hexaglidekins.").replace("-", "_").partition(".")
-        place, _, axis = rest.partition(".")
-        if place.isdecimal():
-            getattr(pins, f"{name}_{axis}".rstrip("_"))[int(place)] = float(value)
-        else:
-            setattr(pins, f"{name}_{rest}".rstrip("_"), float(value))
-    library.setup(ctypes.byref(pins))
+    [ini] = layout.rewrite([paths[0].read_text()], controller.geometry, corrections)
+    component = compiled(ini, tmp_path)
     rows = np.random.default_rng(38).uniform(-1.0, 1.0, (1000, 6)) * (60, 60, 60, 20, 20, 20)
     rows[:, 2] += 550.0
     poses = PoseBatch.of([Pose(*row) for row in rows.tolist()])
     wanted = loaded_joints(mechanism, replace(controller, corrections=corrections), poses)
     assert np.abs(wanted - mechanism.inverse(controller.geometry, controller.branch, poses)).max() > 0.1
     for row, expected in zip(rows, wanted, strict=True):
-        pose, joints = (ctypes.c_double * 9)(*row), SIX()
-        assert library.kinematicsInverse(pose, joints, None, None) == 0
+        pose, joints = (ctypes.c_double * 9)(*row), (ctypes.c_double * 6)()
+        assert component.kinematicsInverse(pose, joints, None, None) == 0
         assert np.array(joints) == pytest.approx(expected, abs=1e-9)
         pose[0], pose[4] = pose[0] + 2.0, pose[4] - 1.0
-        assert library.kinematicsForward(joints, pose, None, None) == 0
+        assert component.kinematicsForward(joints, pose, None, None) == 0
         assert np.array(pose)[:6] == pytest.approx(row, abs=1e-8)

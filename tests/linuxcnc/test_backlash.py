@@ -15,6 +15,7 @@ from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.robot.model import config_layout
 from tests.linuxcnc.conftest import LinuxCNC, _running
+from tests.linuxcnc_orders import joints_of
 from tests.waiting import wait_until
 
 LOST_MM = 0.1
@@ -59,4 +60,5 @@ async def test_joints_reach_the_same_place_from_either_side(
             shown = joints - 0.5 * np.sign(way) * LOST_MM
             wait_until(lambda: np.abs(physics.encoder_positions() - shown).max() < 5e-3)  # noqa: B023
             assert physics._joints == pytest.approx(joints, abs=5e-3)
+            assert await joints_of(controller) == pytest.approx(joints, abs=1e-4), "without what is added"
     await controller.close()

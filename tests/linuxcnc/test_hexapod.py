@@ -15,7 +15,6 @@ from hexacell.cell.loader import load_cell
 from hexacell.config.change import propose
 from hexacell.config.layout import fingerprint
 from hexacell.config.write_back import commit
-from hexacell.kinematics.corrections import Corrections
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import inverse_kinematics, joint_zeros
 from hexacell.kinematics.pose import Pose, PoseBatch
@@ -97,34 +96,3 @@ async def test_other_zeros_are_read_by_a_restart_in_which_no_motor_moves(
     own = inverse_kinematics(mechanism, after, (), PoseBatch.of([pose]))
     assert own[0] == pytest.approx(places[-1], abs=1e-4)
     assert pose.as_tuple() != pytest.approx(THERE.as_tuple(), abs=0.1)
-
-
-@pytest.mark.parametrize("hexapod", ["one file", TWO_FILES], indirect=True)
-async def test_half_of_the_backlash_is_sent_to_the_motors_and_not_reported(
-    hexapod, motors, in_its_folder
-) -> None:
-    cell = load_cell(hexapod.folder / "cell.toml")
-    paths, layout, mechanism = cell.config_paths, config_layout(cell.settings), cell.settings.mechanism
-    geometry, backlash = layout.read(*paths).geometry, (0.1, 0.2, 0.0, 0.05, 0.3, 0.1)
-    change = propose(
-        paths, layout, geometry, Corrections(backlash), fingerprint_at_start=fingerprint(*paths)
-    )
-    driver = LinuxcncrshController(cell.settings.controller)
-    await driver.open()
-    try:
-        await driver.prepare(ALL)
-        commit(change, hexapod.folder / "backup")
-        await driver.reload(ALL)
-        before = await joints_of(driver)
-        for pose in (THERE, Pose(-30.0, 10.0, 770.0, -3.0, 2.0, -6.0), THERE):
-            await driver.move(pose, 1.0)
-            motors.wait()
-            reported = await joints_of(driver)
-            added = np.array(motors.places()[-1]) + joint_zeros(mechanism, geometry) - reported
-            towards = np.sign(np.array(reported) - before)
-            assert added == pytest.approx(0.5 * np.array(backlash) * towards, abs=1e-5)
-            own = inverse_kinematics(mechanism, geometry, (), PoseBatch.of([pose]))
-            assert own[0] + joint_zeros(mechanism, geometry) == pytest.approx(reported, abs=1e-4)
-            before = reported
-    finally:
-        await driver.close()

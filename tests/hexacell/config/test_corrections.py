@@ -226,73 +226,39 @@ def test_what_linuxcnc_would_not_use_is_no_place_for_backlash() -> None:
         layout.rewrite([path.read_text() for path in paths], found.geometry, LAGGING)
 
 
-LEGS_TEXT = """\
-[HEXAGLIDE]
-PLAY1 = 0.1
-COMPLIANCE6 = 3e-4
-WEIGHT = 98.1
-WEIGHT_DIRECTION_Z = -9.81
-WEIGHT_IN_MIDDLE = 1
-"""
+LEGS_INI = LinuxcncIni(HEXAGLIDE_PARAMETERS, {"section": "KINS", "unit_mm": 25.4}, is_part=True)
+LEGS_HAL = HalPins(HEXAGLIDE_PARAMETERS, {"component": "kins"}, is_part=True)
+INI_TEXT = "".join(["[KINS]\n", *(f"{key} = 0.001\n" for key in LEGS_INI._pins)])
+HAL_TEXT = "".join(f"setp {key} 0.001\n" for key in LEGS_HAL._pins)
 
 
-def legs_files(unit_mm: float) -> dict[str, tuple[ConfigLayout, str]]:
-    """A HAL and an INI file with pins, or variables, for play and compliance, all of them."""
-    hal = (CONFIGS / "linuxcnc-hexaglide" / "hexaglide.hal").read_text()
-    ini = (CONFIGS / "linuxcnc-hexaglide" / "geometry.inc").read_text()
-    values = dict(re.findall(r"(?m)^(\w+) = (\S+)$", ini)) | dict(re.findall(r"(\w+) = (\S+)", LEGS_TEXT))
-    given = {"unit_mm": unit_mm, "branch": [-1, -1, -1, 1, 1, 1]}
-    formats = {
-        "ini": LinuxcncIni(HEXAGLIDE_PARAMETERS, given | {"section": "HEXAGLIDE"}),
-        "hal": HalPins(HEXAGLIDE_PARAMETERS, given | {"component": "hexaglidekins"}),
-    }
-    texts = {
-        "ini": re.sub(r"(?m)^(\w+) = \S+$", lambda one: f"{one[1]} = {values[one[1]]}", ini),
-        "hal": re.sub(r"\[HEXAGLIDE\](\w+)", lambda one: values[one[1]], hal),
-    }
-    return {
-        name: (ConfigLayout(HEXAGLIDE_PARAMETERS, (FormatOfFile(name, form),)), texts[name])
-        for name, form in formats.items()
-    }
-
-
-@given(drawn, drawn, st.sampled_from(["ini", "hal"]), st.sampled_from([1.0, 25.4]))
-def test_a_component_that_reads_them_gets_play_and_compliance(
-    one: Corrections, other: Corrections, name: str, unit_mm: float
-) -> None:
-    layout, text = legs_files(unit_mm)[name]
-    [reader] = layout.formats
-    part = reader.reader.read(text, None)
-    there = part.corrections
-    assert (there.play_mm[0], there.compliance_um_n[5]) == pytest.approx((0.1 * unit_mm, 0.3 * unit_mm))
-    assert (there.weight_n, there.weight_direction, there.weight_centre_mm) == (
-        98.1,
-        (0.0, 0.0, -1.0),
-        None,
-    )
-    assert reader.reader.rewrite(text, part.values, there) == text
-    for wanted in (one, other):
-        legs = replace(wanted, backlash=NO_CORRECTIONS.backlash)
-        new = reader.reader.rewrite(text, part.values, legs)
-        assert_same(read(layout, new), legs)
-        assert reader.reader.rewrite(new, part.values, legs) == new
-        assert re.sub(r" [-+.\de]+\n", "", new) == re.sub(r" [-+.\de]+\n", "", text)
+@given(drawn, drawn, st.sampled_from([(LEGS_INI, INI_TEXT, 25.4), (LEGS_HAL, HAL_TEXT, 1.0)]))
+def test_a_component_that_reads_them_gets_play_and_compliance(one, other, case) -> None:
+    form, text, unit_mm = case
+    there = form.read(text, None).corrections
+    assert (there.play_mm[0], there.compliance_um_n[5]) == pytest.approx((0.001 * unit_mm, unit_mm))
+    assert (there.weight_n, there.weight_centre_mm) == (0.001, None)
+    assert form.rewrite(text, {}, there) == form.rewrite(text, {}) == text
+    for wanted in (replace(each, backlash=NO_CORRECTIONS.backlash) for each in (one, other)):
+        new = form.rewrite(text, {}, wanted)
+        assert_same(form.read(new, None).corrections, wanted)
+        assert form.rewrite(new, {}, wanted) == new
+        assert re.sub(r" [-.\d]+\n", "", new) == re.sub(r" [-.\d]+\n", "", text)
         text = new
 
 
 @pytest.mark.parametrize(
     ("old", "new", "problem"),
     [
-        ("PLAY1 = 0.1", "PLAY1 = 5.1", "PLAY1 is 5.1"),
-        ("COMPLIANCE6 = 3e-4", "COMPLIANCE6 = -3e-4", "COMPLIANCE6 is -3e-4"),
-        ("Z = -9.81", "Z = 0.0", "the weight has no direction"),
-        ("PLAY3 = 0.0\n", "", "there is no PLAY3"),
+        ("PLAY1 = 0.001", "PLAY1 = 0.2", "PLAY1 is 0.2"),
+        ("COMPLIANCE6 = 0.001", "COMPLIANCE6 = -1e-4", "COMPLIANCE6 is -1e-4"),
+        ("PLAY3 = 0.001\n", "", "there is no PLAY3"),
+        ("0.001", "0.0", "the weight has no direction"),
     ],
 )
 def test_what_the_component_must_not_get_is_refused(old: str, new: str, problem: str) -> None:
-    layout, text = legs_files(1.0)["ini"]
     with pytest.raises(FileError, match=problem):
-        read(layout, text.replace(old, new))
+        LEGS_INI.read(INI_TEXT.replace(old, new), None)
 
 
 INI = LinuxcncIni(GOUGH_STEWART_PARAMETERS, ZEROS | {"unit_mm": 25.4}, is_part=True)

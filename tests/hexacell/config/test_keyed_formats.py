@@ -246,21 +246,6 @@ class TestWhatLinuxcncSees:
         assert found.geometry["l"].tolist() == [600, 601, 602, 603, 604, 605]
 
 
-def limits(lowest: float, highest: float) -> list[str]:
-    return [f"[JOINT_{n}]\nMIN_LIMIT = {lowest}\nMAX_LIMIT = {highest + n}" for n in range(6)]
-
-
-def test_limits_of_the_joints_in_the_same_ini_file_are_read(written) -> None:
-    rows = write_ini(lambda _: "1.5", " ")
-    form = one_file(LinuxcncIni(HEXAGLIDE_PARAMETERS, INI | {"unit_mm": 25.4}))
-    found = form.read(written("\n".join([*rows, *limits(-10.0, 20.0)])))
-    assert found.limits.joints is not None
-    assert found.limits.joints[5] == pytest.approx((-254.0, 635.0))
-    assert form.read(written("\n".join([*rows, *limits(-10.0, 20.0)[:5]]))).limits.joints is None
-    with pytest.raises(FileError, match=r"MAX_LIMIT of \[JOINT_0\] is not above"):
-        form.read(written("\n".join([*rows, *limits(30.0, 20.0)])))
-
-
 def test_a_pin_set_to_a_variable_names_the_other_format(written) -> None:
     rows = write_hal(lambda name: "[HEXAGLIDE]S1X" if name == "S1x" else "1.5", " ")
     with pytest.raises(FileError, match="a variable of the INI file") as caught:

@@ -108,29 +108,6 @@ def test_a_change_is_written_in_its_lines_alone_and_undone_bit_for_bit(real: Rea
         assert all(link.is_symlink() for link in links)
 
 
-def geometry_lines(real: Real) -> list[tuple[int, int]]:
-    """File and place of every line that a change of some number changes."""
-    found = []
-    with tempfile.TemporaryDirectory() as place:
-        geometry = real.of(*written(Path(place), [text.encode() for text in real.texts]))
-        new = real.layout.rewrite(real.texts, moved(geometry, list(range(42))))
-    for number, (one, other) in enumerate(zip(real.texts, new, strict=True)):
-        pairs = zip(one.split("\n"), other.split("\n"), strict=True)
-        found += [(number, place) for place, (old, changed) in enumerate(pairs) if old != changed]
-    return found
-
-
-def test_any_line_of_the_geometry_twice_is_refused_with_a_line(real: Real, tmp_path: Path) -> None:
-    for attempt, (number, place) in enumerate(geometry_lines(real)):
-        lines = real.texts[number].split("\n")
-        contents = [text.encode() for text in real.texts]
-        contents[number] = "\n".join([*lines[:place], lines[place], *lines[place:]]).encode()
-        (tmp_path / str(attempt)).mkdir()
-        with pytest.raises(FileError) as caught:
-            real.of(*written(tmp_path / str(attempt), contents))
-        assert caught.value.line is not None
-
-
 def test_what_is_not_utf8_is_refused_with_its_line_and_stays(real: Real, tmp_path: Path) -> None:
     contents = [text.encode() for text in real.texts]
     contents[-1] += "# Länge".encode("latin-1")

@@ -109,11 +109,7 @@ class Allowances:
 
     def between_visits(self, reference: Pose, visits: Array) -> tuple[ReferenceChange, ...]:
         """The changes between m visits (m, 9) of one reference, as m - 1 that are independent."""
-        contrasts = (
-            np.sqrt(2.0 * k / (k + 1.0)) * (visits[:k].mean(axis=0) - visits[k])
-            for k in range(1, len(visits))
-        )
-        return tuple(self.since(reference, np.zeros(9), one) for one in contrasts)
+        return tuple(self.since(reference, np.zeros(9), one) for one in contrasts(visits))
 
     def mounting_mm(self, reference: Pose) -> Array:
         """How far each plunger (3,) may stand from the middle of its travel when the gauges are zeroed.
@@ -159,6 +155,13 @@ class Allowances:
         """How the ball moves near a reference by what the encoders show."""
         robot = self.robot
         return BallByEncoders.at(robot, robot.belief(self.found), robot.from_commands([reference]))
+
+
+def contrasts(rows: Array) -> Array:
+    """Differences (m - 1, k) of m rows (m, k) alike, that are independent, each of two rows' variance."""
+    return np.array(
+        [np.sqrt(2.0 * k / (k + 1.0)) * (rows[:k].mean(axis=0) - rows[k]) for k in range(1, len(rows))]
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

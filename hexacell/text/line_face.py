@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from hexacell.campaign.decisions import Forecast
 from hexacell.lengths import unit_of
 from hexacell.text.layout import COLUMNS, duration, wrapped
-from hexacell.text.measured_noise import measured_noise_text
+from hexacell.text.measured_noise import measured_noise_text, reversal_sentence
 from hexacell.text.planning import quick_accuracy_text, run_forecast_line
 from hexacell.text.verdict import check_text, length_text, start_text, verification_text
 from procedures.journal.journal import Entry
@@ -165,8 +165,12 @@ def event_text(event: events.Event, state: RunState) -> str | None:
             pilots = len(state.set(event.at).pilots)
             meanwhile = f"meanwhile {pilots} pilot poses were read, by which the next ones are chosen"
             return f"{noise}\n{wrapped(meanwhile, indent=2)}" if pilots else noise
-        case events.Identified(quick=quick):
-            return None if quick is None else quick_accuracy_text(quick)
+        case events.Identified(quick=quick, reversal=reversal):
+            found = "" if reversal is None else wrapped(reversal_sentence(reversal), indent=2)
+            return (
+                "\n".join(filter(None, ["" if quick is None else quick_accuracy_text(quick), found]))
+                or None
+            )
         case events.ResultValidated():
             if event.verification is not None:
                 return verification_text(event.verification)

@@ -7,6 +7,7 @@ from hexacell.lengths import shown, unit_of
 from hexacell.noise.approach_scatter import RepeatedApproaches, ScatterSource
 from hexacell.noise.measured_noise import AveragingForecast, InstrumentNoise, MeasuredNoise
 from hexacell.noise.noise_assessment import worthwhile_windows
+from hexacell.noise.reversal import Reversal
 from hexacell.text.layout import duration, wrapped
 
 THOUSAND = 1e3
@@ -27,6 +28,20 @@ def measured_noise_sentences(measured: MeasuredNoise) -> tuple[str, ...]:
     """What was measured and what is wrong, as sentences of a page."""
     lines = (" ".join(line.split()) for line in [*_summary(measured), *_warnings(measured)])
     return tuple(f"{line[:1].upper()}{line[1:].removesuffix('.')}." for line in lines)
+
+
+def reversal_sentence(found: Reversal) -> str:
+    """What repeated visits of the references showed, with the terms of ISO 230-2."""
+    repeatability = f"repeatability of the ball {shown(found.repeatability_mm)}"
+    if found.joints is None or found.sigma is None:
+        return f"every visit from one side: {repeatability}, reversal not measured"
+    unit = unit_of(*found.joints, *found.sigma, unit=found.unit)
+    smallest, largest = (unit.number(limit(found.joints)) for limit in (min, max))
+    ball = unit_of(found.ball_mm, found.ball_sigma_mm)
+    return (
+        f"reversal of the joints {smallest} to {largest} +- {unit.length(max(found.sigma))}, of the ball "
+        f"{ball.number(found.ball_mm)} +- {ball.length(found.ball_sigma_mm)}; bidirectional {repeatability}"
+    )
 
 
 def _summary(measured: MeasuredNoise) -> Iterator[str]:

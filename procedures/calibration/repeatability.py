@@ -11,15 +11,20 @@ import numpy as np
 from hexacell.campaign.planner import Plan
 from hexacell.cell.devices import EncoderSettings
 from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.corrections import CorrectionKind
+from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
-from hexacell.noise.allowances import Allowances, ReferenceChange
+from hexacell.noise.allowances import Allowances, ReferenceChange, contrasts
 from hexacell.noise.measured_noise import MeasuredNoise
 from hexacell.noise.noise_assessment import NoiseReadings, assess_again
+from hexacell.noise.reversal import Reversal, Revisit, reversal_of
 from hexacell.noise.standstill import display_step
 from procedures.run.keys import Phase
 from procedures.run.readings import Reading
 from procedures.run.state import RunState, SetState
+
+BACKLASH = str(CorrectionKind.BACKLASH)
 
 
 def noise_readings(
@@ -100,3 +105,28 @@ def _visits(plan: Plan, state: RunState, allowances: Allowances) -> NoiseReading
         return None
     windows = state.noise.noise.windows
     return noise_readings(visited, plan.settings.encoders, windows=windows, allowances=allowances)
+
+
+def reversal_by_repeats(plan: Plan, state: RunState, found: Identification) -> Reversal | None:
+    """Reversal and repeatability by all visits of references before the geometry was identified.
+
+    Those count at which it is known from which side every joint had arrived.
+    """
+    allowances = Allowances(plan.settings, plan.robot, is_measured=True, found=found)
+    visits: list[Revisit] = []
+    for key, one in state.sets.items():
+        if key.phase is not Phase.IDENTIFY or not one.samples:
+            continue
+        closing = [] if one.closing is None else [one.closing]
+        readings = [one.samples[0].reading, *(visit.reading for visit in one.visits), *closing]
+        known = [reading for reading in readings if reading.directions and all(reading.directions)]
+        rows = np.array([[*one.gauges_mm, *one.joints, *one.directions] for one in known])
+        reference = Pose(*one.samples[0].pose)
+        ball = allowances.ball_at(reference)
+        for row in contrasts(rows):
+            change = allowances.since(reference, np.zeros(9), row[:9])
+            visits.append(Revisit(row[:3], change, ball.by_joints, row[9:]))
+    stated, unit = plan.settings.model.backlash, plan.settings.mechanism.words.joint_unit
+    if found.terms is not None and BACKLASH in {term.name for term in found.terms.terms}:
+        return reversal_of(visits, *found.terms.of(BACKLASH), unit)
+    return reversal_of(visits, np.zeros(LEGS), np.full(LEGS, stated), unit)

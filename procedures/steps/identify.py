@@ -7,12 +7,14 @@ from hexacell.checks.quick_level import QuickAccuracy
 from hexacell.errors import LimitError
 from hexacell.identification.estimator import identify
 from hexacell.measurements.csv_file import write_measurements
+from hexacell.noise.reversal import Reversal
 from hexacell.results.result import ExpectedImprovement, IdentificationResult
 from hexacell.verdict.assessment import Assessment, assess
 from hexacell.verdict.findings import findings
 from hexacell.verdict.fit_document import fit_document
 from procedures.calibration.calibration import Knowledge
 from procedures.calibration.held_out_poses import PosesByPoint
+from procedures.calibration.repeatability import reversal_by_repeats
 from procedures.resources.run_resources import RunResources
 from procedures.run.keys import SixNumbers
 from procedures.run.state import RunState
@@ -25,6 +27,7 @@ class Identified(BaseEvent):
     ``held_out`` are measured at each point before and after, ``held_out_after`` only after: the robot
     cannot take them safely before it is calibrated. ``improvement`` is None where the robot can reach none
     of the task poses. ``quick`` is how well the quick level knows the robot; None in other runs.
+    ``reversal`` is what repeated visits of the references showed; None of too few.
     """
 
     kind: Literal["identified"] = "identified"
@@ -33,6 +36,7 @@ class Identified(BaseEvent):
     held_out_after: tuple[tuple[SixNumbers, ...], ...] = ()
     improvement: ExpectedImprovement | None = None
     quick: QuickAccuracy | None = None
+    reversal: Reversal | None = None
 
     def applied_to(self, state: RunState) -> RunState:
         return replace(state, identified=self)
@@ -63,6 +67,7 @@ class Identify(Computation):
             held_out_after=known.held_out_poses_after(identified, held_out),
             improvement=assessed.improvement,
             quick=known.quick.accuracy(measurements) if is_quick else None,
+            reversal=reversal_by_repeats(known.plan, state, identified),
         )
 
 

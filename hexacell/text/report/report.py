@@ -6,7 +6,7 @@ from datetime import date
 
 from drivers.interfaces import DeviceIdentity
 from hexacell.services.history.reported_run import ReportedRun
-from hexacell.text.measured_noise import measured_noise_sentences
+from hexacell.text.measured_noise import measured_noise_sentences, reversal_sentence
 from hexacell.text.report import results, statement
 from hexacell.text.report.pages import Chapter, Facts, Paragraph, Report, Table, Tone
 
@@ -63,6 +63,9 @@ def conditions_chapter(run: ReportedRun) -> Chapter:
         pairs.append(("Temperature", "not measured"))
     pairs += [("Sets measured again", str(state.invalidated))] if state.invalidated else []
     noise = () if state.noise is None else measured_noise_sentences(state.noise.noise)
+    if state.identified is not None and (reversal := state.identified.reversal) is not None:
+        sentence = reversal_sentence(reversal)
+        noise = (*noise, f"{sentence[:1].upper()}{sentence[1:]}.")
     columns = ("Set of records", "records", "largest deviation, mm", "drift of the gauges, mm")
     # The sets whose reference was read again, with how far the gauges had drifted by then.
     rows = tuple(

@@ -18,7 +18,6 @@ from typing import Any, ParamSpec, TypeVar
 
 import distributed
 from distributed.client import FutureCancelledError
-from distributed.exceptions import WorkerStartTimeoutError
 from distributed.scheduler import KilledWorker
 
 from hexacell import __version__
@@ -165,36 +164,20 @@ class ClusterExecutor(Executor):
 
 async def _connect(address: str, patience_s: float) -> distributed.Client:
     client = distributed.Client(address, timeout=patience_s, set_as_default=False, asynchronous=True)
-    try:
-        await _start(client, address)
-        await _require_workers(client, address, patience_s)
-        await _require_same_version(client, address)
-    except BaseException:
-        await _close(client)
-        raise
-    return client
-
-
-async def _start(client: distributed.Client, address: str) -> None:
+    problem, start = "no Dask scheduler answers", "one there with `dask scheduler`, and workers"
     try:
         await client
-    except Exception as error:
-        raise ClusterError(
-            "no Dask scheduler answers",
-            subject=address,
-            action="Start one there with `dask scheduler`, and workers; results so far are kept",
-        ) from error
-
-
-async def _require_workers(client: distributed.Client, address: str, patience_s: float) -> None:
-    try:
+        problem = "the Dask scheduler has no workers"
+        start = f"some with `dask worker {address} --nthreads 1`"
         await client.wait_for_workers(1, timeout=patience_s)  # type: ignore[func-returns-value, misc]
-    except WorkerStartTimeoutError as error:
-        raise ClusterError(
-            "the Dask scheduler has no workers",
-            subject=address,
-            action=f"Start some with `dask worker {address} --nthreads 1`; results so far are kept",
-        ) from error
+        await _require_same_version(client, address)
+    except BaseException as error:
+        await _close(client)
+        if isinstance(error, OSError | TimeoutError):
+            action = f"Start {start}; results so far are kept"
+            raise ClusterError(problem, subject=address, action=action) from error
+        raise
+    return client
 
 
 async def _close(client: distributed.Client) -> None:

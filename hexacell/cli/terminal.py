@@ -15,8 +15,9 @@ from typing import Any, TextIO, TypeVar
 from hexacell.cli.console import Console
 from hexacell.cli.process import STOP_SIGNALS, handled
 from hexacell.errors import AnswerNeeded, Interruption
-from hexacell.text.line_face import LETTERS, request_text, typed_answer
+from hexacell.text.line_face import LETTERS
 from hexacell.text.run import question_text
+from hexacell.text.screens.questions import question_view
 from procedures.engine.commands import Abort, Command, CommandQueue, MeasureAgain, Pause, Resume, Stop, Undo
 from procedures.run.keys import SetKey
 from procedures.run.questions import Question
@@ -180,13 +181,14 @@ class TerminalOperator:
         Raises:
             AnswerNeeded: the terminal's input has ended.
         """
-        text = question_text(question)
+        view = question_view(question, None, APPROVER)
+        text = question_text(view)
         while True:
             typed = await self._answer(text)
-            if (answer := typed_answer(typed, question, APPROVER)) is not None:
-                return answer.value
+            if (choice := view.typed_choice(typed)) is not None:
+                return choice.value
             self.type_command(typed)
-            text = request_text(question)
+            text = view.request
 
     async def _answer(self, question: str) -> str:
         self.before_question()

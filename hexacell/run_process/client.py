@@ -11,18 +11,7 @@ from pathlib import Path
 from typing import BinaryIO, Protocol
 
 from hexacell.errors import ExitCode, FileError, HexacellError
-from hexacell.run_process.messages import (
-    LONGEST_MESSAGE,
-    ClientMessage,
-    EventRecorded,
-    GiveCommand,
-    HostFailed,
-    HostMessage,
-    Leave,
-    TakeControl,
-    host_message,
-    message_line,
-)
+from hexacell.run_process import messages as protocol
 from hexacell.run_process.run_socket import peer_of
 from procedures.engine.commands import Command
 from procedures.steps import events
@@ -37,7 +26,7 @@ LET_GO_S = 5.0
 """How long leaving waits until the run has heard that it is to go on, s. Whoever hangs up before may be
 taken for lost, because what is still unread goes with the connection, and the run pauses."""
 
-LOST = HostFailed(
+LOST = protocol.HostFailed(
     problem="the connection to the run is lost: its process was killed, or let this terminal go",
     action="Attach again. If nothing is there, look at the robot, whose last move may go on, and resume",
     exit_code=int(ExitCode.HARDWARE),
@@ -51,7 +40,7 @@ class RunConnection(Protocol):
     message. All raise ``HexacellError`` where the run cannot be reached any more.
     """
 
-    def messages(self) -> AsyncIterator[HostMessage]:
+    def messages(self) -> AsyncIterator[protocol.HostMessage]:
         """Everything that the run sends; ends when it is over. To be called once."""
         ...
 
@@ -71,7 +60,7 @@ class RunConnection(Protocol):
 class HostNotStarted(HexacellError):
     """The process of a run could not begin; the exit code is that of the reason."""
 
-    def __init__(self, failure: HostFailed) -> None:
+    def __init__(self, failure: protocol.HostFailed) -> None:
         super().__init__(failure.problem, action=failure.action or None)
         self.exit_code = ExitCode(failure.exit_code or ExitCode.FAULT)
 
@@ -85,14 +74,14 @@ class HostConnection:
         self._is_left = False
         self._goes_on_alone = False
 
-    async def messages(self) -> AsyncIterator[HostMessage]:
+    async def messages(self) -> AsyncIterator[protocol.HostMessage]:
         """Everything that the run sends; a connection that is lost ends with a failure."""
         has_ended = False
         with suppress(ConnectionError):
             while (line := await self._reader.readline()).endswith(b"\n"):
                 if self._goes_on_alone:  # what it still says was on its way
                     continue
-                message = host_message(line)
+                message = protocol.host_message(line)
                 has_ended = has_ended or _is_ending(message)
                 yield message
         self._writer.close()
@@ -101,23 +90,23 @@ class HostConnection:
 
     async def give(self, command: Command) -> None:
         """Give the engine a command."""
-        await self._send(GiveCommand(command=command))
+        await self._send(protocol.GiveCommand(command=command))
 
     async def take_control(self) -> None:
         """Become the one who gives commands."""
-        await self._send(TakeControl())
+        await self._send(protocol.TakeControl())
 
     async def leave(self, *, keep_running: bool) -> None:
         """Leave the run, which hangs up when it has heard that, or when it has ended."""
         self._is_left, self._goes_on_alone = True, keep_running
         with suppress(HexacellError, TimeoutError):
-            await self._send(Leave(keep_running=keep_running))
+            await self._send(protocol.Leave(keep_running=keep_running))
             await asyncio.wait_for(self._until_gone(), LET_GO_S if keep_running else STOP_S)
         self._writer.close()
 
-    async def _send(self, message: ClientMessage) -> None:
+    async def _send(self, message: protocol.ClientMessage) -> None:
         try:
-            self._writer.write(message_line(message))
+            self._writer.write(protocol.message_line(message))
             await self._writer.drain()
         except OSError as error:
             raise FileError(
@@ -130,12 +119,12 @@ class HostConnection:
             await asyncio.sleep(0.01)
 
 
-def _is_ending(message: HostMessage) -> bool:
+def _is_ending(message: protocol.HostMessage) -> bool:
     """Whether a message says that the run is over."""
     match message:
-        case EventRecorded(event=events.Ended() | events.Interrupted()):
+        case protocol.EventRecorded(event=events.Ended() | events.Interrupted()):
             return True
-        case HostFailed(exit_code=int()):
+        case protocol.HostFailed(exit_code=int()):
             return True
         case _:
             return False
@@ -148,7 +137,7 @@ async def connect_to_run(path: Path) -> HostConnection | None:
         FileError: it is another user's.
     """
     try:
-        reader, writer = await asyncio.open_unix_connection(str(path), limit=LONGEST_MESSAGE)
+        reader, writer = await asyncio.open_unix_connection(str(path), limit=protocol.LONGEST_MESSAGE)
     except OSError:
         return None
     _, user = peer_of(writer.get_extra_info("socket"))
@@ -167,7 +156,7 @@ async def start_host(path: Path, arguments: Sequence[str]) -> HostConnection:
     await asyncio.to_thread(_spawn, arguments)
     connection = await connect_to_run(path)
     if connection is None:
-        raise HostNotStarted(HostFailed(problem="the run's process ended at once"))
+        raise HostNotStarted(protocol.HostFailed(problem="the run's process ended at once"))
     return connection
 
 
@@ -191,12 +180,12 @@ def _spawn(arguments: Sequence[str]) -> None:
             raise HostNotStarted(_failure_in(answer, errors))
 
 
-def _failure_in(answer: bytes, errors: BinaryIO) -> HostFailed:
+def _failure_in(answer: bytes, errors: BinaryIO) -> protocol.HostFailed:
     with suppress(HexacellError):
-        message = host_message(answer)
-        if isinstance(message, HostFailed):
+        message = protocol.host_message(answer)
+        if isinstance(message, protocol.HostFailed):
             return message
     errors.seek(0)
     words = errors.read().decode(errors="replace").strip().splitlines()
     problem = words[-1] if words else "its process ended without a word"
-    return HostFailed(problem=f"the run could not begin: {problem}", exit_code=int(ExitCode.FAULT))
+    return protocol.HostFailed(problem=f"the run could not begin: {problem}", exit_code=int(ExitCode.FAULT))

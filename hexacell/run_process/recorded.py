@@ -6,15 +6,7 @@ from collections.abc import AsyncIterator, Sequence
 from hexacell.clock import CellClock
 from hexacell.errors import FileError, UsageError
 from hexacell.kinematics.pose import Pose
-from hexacell.run_process.messages import (
-    CursorMoved,
-    EventRecorded,
-    HostMessage,
-    QuestionClosed,
-    QuestionOpened,
-    RunDescribed,
-    StatusChanged,
-)
+from hexacell.run_process import messages as protocol
 from hexacell.runs.run_folder import RunFolder
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Command
@@ -84,14 +76,14 @@ class RecordedRun:
         self._speed = speed
         self._moved.set()
 
-    async def messages(self) -> AsyncIterator[HostMessage]:
+    async def messages(self) -> AsyncIterator[protocol.HostMessage]:
         """The run up to the cursor; going back sends it anew."""
         sent = 0
         while not self._is_left:
             self._moved.clear()
             if sent == 0 or sent > self._sequence:
                 sent = 0
-                yield RunDescribed(
+                yield protocol.RunDescribed(
                     cell=self._started.cell,
                     cell_file=self._folder.cell_file,
                     folder=self._folder.path,
@@ -102,7 +94,7 @@ class RecordedRun:
             while sent < self._sequence and not self._is_left:
                 sent += 1
                 entry = self._entries[sent - 1]
-                yield EventRecorded(sequence=sent, at=entry.at, event=entry.event)
+                yield protocol.EventRecorded(sequence=sent, at=entry.at, event=entry.event)
             for message in self._present(sent):
                 yield message
             await self._until_moved(sent)
@@ -125,10 +117,10 @@ class RecordedRun:
         self._is_left = True
         self._moved.set()
 
-    def _present(self, sequence: int) -> list[HostMessage]:
+    def _present(self, sequence: int) -> list[protocol.HostMessage]:
         """What else a run sends: its status, its question, and where the cursor is."""
         entry = self._entries[sequence - 1]
-        at_cursor = CursorMoved(sequence=sequence, last=self.last, at=entry.at, speed=self._speed)
+        at_cursor = protocol.CursorMoved(sequence=sequence, last=self.last, at=entry.at, speed=self._speed)
         status, question = Status.RUNNING, None
         match entry.event:
             case events.Ended() | events.Interrupted():
@@ -137,8 +129,10 @@ class RecordedRun:
                 status = Status.PAUSED
             case events.StepBegun(step=Place(at=at, pose=pose)):
                 status, question = Status.AWAITING_OPERATOR, ask_placement(at, Pose(*pose))
-        asked = QuestionClosed() if question is None else QuestionOpened(question=question)
-        return [StatusChanged(status=status), asked, at_cursor]
+        asked = (
+            protocol.QuestionClosed() if question is None else protocol.QuestionOpened(question=question)
+        )
+        return [protocol.StatusChanged(status=status), asked, at_cursor]
 
     async def _until_moved(self, sent: int) -> None:
         """Wait until the cursor is moved, or moves by itself."""

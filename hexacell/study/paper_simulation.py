@@ -197,7 +197,7 @@ class MedianErrors:
         paper_mm: error of the paper's estimator in draws that settled; NaN if no draw did.
         ours_there_mm: error of this program's estimator in these draws; NaN where it refuses all.
         ours_mm: error of this program's estimator in all draws that it identified.
-        after_steps_mm: errors of the paper's after 3, 5 and 10 steps, in all draws that came so far.
+        after_steps_mm: errors of the paper's after some numbers of steps, in all draws that came so far.
     """
 
     trials: int
@@ -206,7 +206,7 @@ class MedianErrors:
     paper_mm: float
     ours_there_mm: float
     ours_mm: float
-    after_steps_mm: tuple[float, ...]
+    after_steps_mm: Mapping[int, float]
 
     @classmethod
     def of(cls, errors: Sequence[Errors]) -> MedianErrors:
@@ -219,7 +219,7 @@ class MedianErrors:
             median(one.paper_mm for one in settled),
             median(one.ours_mm for one in settled if one.ours),
             median(one.ours_mm for one in errors if one.ours),
-            tuple(median(_after(one, steps) for one in errors) for steps in STEPS_SHOWN),
+            {steps: median(_after(one, steps) for one in errors) for steps in STEPS_SHOWN},
         )
 
 
@@ -249,7 +249,7 @@ class PaperStudy:
 
     figures: Mapping[int, tuple[PlannedSet, ...]]
     sweep: tuple[PlannedSet, ...]
-    table_2: Mapping[str, tuple[float, float]]
+    table_2: Mapping[str, Mapping[str, float]]
 
 
 Kind = tuple[int, int, float, Angles]
@@ -278,10 +278,10 @@ def summary(trials: Mapping[str, Trial], outcomes: Mapping[str, Outcome]) -> Pap
         {figure: tuple(_set(one, found[one]) for one in _figure_kinds(figure)) for figure in FIGURES},
         tuple(_set(one, found[one]) for one in _sweep_kinds()),
         {
-            symbol: (
-                median(one.paper[symbol] for one in most if one.is_settled),
-                median(one.ours[symbol] for one in most if one.ours),
-            )
+            symbol: {
+                "paper_mm": median(one.paper[symbol] for one in most if one.is_settled),
+                "ours_mm": median(one.ours[symbol] for one in most if one.ours),
+            }
             for symbol in PAPER_TABLE_2_MM
         },
     )

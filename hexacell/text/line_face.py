@@ -1,14 +1,13 @@
-"""Text for a plain terminal: what to type and what it means, where a run is, and what happens in it.
+"""Text for a plain terminal: what to type, where a run is, and what happens in it.
 
-A question takes exactly what it offers; motion and changes begin only on an explicit answer. A step and its
-events have their own words (:mod:`procedures.steps`); those whose text is more than a line have it here.
+A step and its events have their own words (:mod:`procedures.steps`); those whose text is more than a line
+have it here.
 """
 
 from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from hexacell.campaign.decisions import Forecast
@@ -18,7 +17,6 @@ from hexacell.text.measured_noise import measured_noise_text, reversal_sentence
 from hexacell.text.planning import quick_accuracy_text, run_forecast_line
 from hexacell.text.verdict import check_text, length_text, start_text, verification_text
 from procedures.journal.journal import Entry
-from procedures.run import questions
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, apply
 from procedures.steps import events
@@ -26,8 +24,6 @@ from procedures.steps.move import Move
 
 if TYPE_CHECKING:
     from hexacell.run_process.messages import GaugeSnapshot, LiveSnapshot
-
-YES, NO = ("yes", "y"), ("no", "n")
 
 INDENT = 10
 """Width of the column with the time."""
@@ -68,42 +64,6 @@ def _gauge_text(gauge: GaugeSnapshot) -> str:
         return shown
     beside = gauge.shown_mm - gauge.middle_mm
     return f"{shown}; {beside:+.2f} from mid travel ({gauge.travel_mm:g} {gauge.unit})"
-
-
-@dataclass(frozen=True, slots=True)
-class TypedAnswer:
-    """An answer to a question; ``value`` is None where the person declines."""
-
-    value: str | None
-
-
-def typed_answer(typed: str, question: questions.Question, person: str) -> TypedAnswer | None:
-    """The answer in a typed line, None if it is not one; ``person`` is who gives it."""
-    line = typed.strip()
-    match question.subject:
-        case questions.GaugePlacement():
-            return None if line else TypedAnswer(questions.PLACED)
-        case questions.PendingChange() | questions.WrittenResult():
-            answer, consent = line.lower(), question.consent.lower()
-            if answer == consent or (consent == YES[0] and answer in YES):
-                return TypedAnswer(person)
-            return TypedAnswer(None) if answer in NO else None
-        case questions.StepFailure() | questions.UnreadyController():
-            answer = line.lower().replace(" ", "-")
-            found = [choice for choice in question.choices if answer and choice.startswith(answer)]
-            return TypedAnswer(found[0]) if len(found) == 1 else None
-
-
-def request_text(question: questions.Question) -> str:
-    """What to type."""
-    match question.subject:
-        case questions.GaugePlacement():
-            return "Press Enter when they are in place, or type a to abort: "
-        case questions.StepFailure():
-            return f"Type one of {', '.join(question.choices)}: "
-    if isinstance(question.subject, questions.UnreadyController) or question.consent == YES[0]:
-        return "Type yes or no: "
-    return f"Type the cell's name, {question.consent}, to take the responsibility, or no: "
 
 
 class EventFormatter:

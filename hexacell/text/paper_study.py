@@ -1,37 +1,17 @@
 """The paper's simulations and experiment as text, documents and pictures, beside what the paper says."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
 from math import isfinite
 from typing import Any
 
-from hexacell.study.paper_experiment import (
-    AMPLITUDE_DEG,
-    CHOSEN_WITHIN_DEG,
-    MEAN_DISTANCE,
-    ORIENTATIONS,
-    PAPER_REDUCTION,
-    PAPER_REPEATABILITY_MM,
-    ExperimentStudy,
-    Reduction,
-)
-from hexacell.study.paper_simulation import (
-    FIGURES,
-    NOISE_MM,
-    PAPER_EXACT_MM,
-    PAPER_NOISY_MM,
-    PAPER_TABLE_2_MM,
-    STEPS_SHOWN,
-    MedianErrors,
-    PaperStudy,
-    PlannedSet,
-)
+from hexacell.study import paper_experiment as experiment
+from hexacell.study import paper_simulation as simulation
 from hexacell.text.layout import wrapped
 from hexacell.text.svg_drawing import AFTER, BEFORE, SMALLEST_MM, as_svg, columns, new_figure
 
 WHAT_THE_PAPER_SAYS = {
-    4: f"The paper: one point never; two or more without noise {PAPER_EXACT_MM:g} mm, after a limited "
-    f"number of steps; five with noise {PAPER_NOISY_MM:g} mm.",
+    4: f"The paper: one point never; two or more without noise {simulation.PAPER_EXACT_MM:g} mm, after a "
+    f"limited number of steps; five with noise {simulation.PAPER_NOISY_MM:g} mm.",
     5: "The paper: not with two or three points; errors fall with the number of points.",
 }
 OPEN = (
@@ -47,15 +27,15 @@ HEAD = f"  {'points':<8} {'without noise: P, ours':<26} {'with noise: P, ours th
 SWEEP_HEAD = f"  {'angles':<16} deg {'after steps':<20} {'P, ours there, ours':<24} deviation"
 
 
-def study_lines(study: PaperStudy) -> Iterator[str]:
+def study_lines(study: simulation.PaperStudy) -> Iterator[str]:
     """The whole of it, in lines of at most 80 columns."""
     yield wrapped(OPEN)
     for figure, sets in study.figures.items():
         yield ""
         first = sets[0]
         yield wrapped(
-            f"Figure {figure}: largest error of a parameter, mm; {FIGURES[figure]} orientations at each "
-            f"point, +-{first.amplitude_deg:g} deg; medians of {first.noisy.trials} draws. P is the "
+            f"Figure {figure}: largest error of a parameter, mm; {simulation.FIGURES[figure]} orientations at "
+            f"each point, +-{first.amplitude_deg:g} deg; medians of {first.noisy.trials} draws. P is the "
             "paper's estimator, in brackets in how many draws it comes to an end; then ours of the same "
             "draws, and of all. The deviation is what gauges would have to show."
         )
@@ -67,57 +47,22 @@ def study_lines(study: PaperStudy) -> Iterator[str]:
     yield ""
     yield wrapped("Table 2: 5 points, 11 orientations, noise of 0.01 mm; largest errors by kinds, mm.")
     yield "  parameters   in the paper   paper's estimator   ours"
-    for kind, (paper, ours) in study.table_2.items():
-        yield f"  {kind:<12} {PAPER_TABLE_2_MM[kind]:<14.3f} {_number(paper):<19} {_number(ours)}"
+    for kind, found in study.table_2.items():
+        both = f"{_number(found['paper_mm']):<19} {_number(found['ours_mm'])}"
+        yield f"  {kind:<12} {simulation.PAPER_TABLE_2_MM[kind]:<14.3f} {both}"
     yield ""
     yield wrapped(
         "Other orientations: 5 points, 11 orientations, with noise; largest error of a parameter, mm. "
-        f"After {', '.join(map(str, STEPS_SHOWN))} steps of the paper's estimator, at its end, and ours as "
-        "above."
+        f"After {', '.join(map(str, simulation.STEPS_SHOWN))} steps of the paper's estimator, at its end, "
+        "and ours as above."
     )
     yield SWEEP_HEAD
     for one in study.sweep:
-        after = " ".join(f"{_number(error):<6}" for error in one.noisy.after_steps_mm)
+        after = " ".join(f"{_number(error):<6}" for error in one.noisy.after_steps_mm.values())
         angles = f"{one.angles:<16} {one.amplitude_deg:<3g}"
         yield f"  {angles} {after} {_in_full(one.noisy):<24} {one.deviation_mm:.0f} mm"
     yield ""
     yield wrapped(NO_GAUGE)
-
-
-def study_document(study: PaperStudy) -> dict[str, Any]:
-    """All figures as a JSON document; what is not finite is null."""
-    document: dict[str, Any] = finite(
-        {
-            "noise_mm": NOISE_MM,
-            "paper": {
-                "exact_mm": PAPER_EXACT_MM,
-                "noisy_mm": PAPER_NOISY_MM,
-                "table_2_mm": PAPER_TABLE_2_MM,
-            },
-            "figures": {figure: [_set(one) for one in sets] for figure, sets in study.figures.items()},
-            "sweep": [_set(one) for one in study.sweep],
-            "table_2": {
-                kind: {"paper_mm": paper, "ours_mm": ours} for kind, (paper, ours) in study.table_2.items()
-            },
-        }
-    )
-    return document
-
-
-def _set(one: PlannedSet) -> dict[str, Any]:
-    medians = {"exact": one.exact, "noisy": one.noisy}
-    return asdict(one) | {
-        noise: asdict(errors)
-        | {"after_steps_mm": dict(zip(STEPS_SHOWN, errors.after_steps_mm, strict=True))}
-        for noise, errors in medians.items()
-    }
-
-
-def experiment_document(study: ExperimentStudy) -> dict[str, Any]:
-    """All figures as a JSON document; what is not finite is null."""
-    paper = {"reduction": PAPER_REDUCTION, "repeatability_mm": PAPER_REPEATABILITY_MM}
-    document: dict[str, Any] = finite({"paper": paper, **asdict(study)})
-    return document
 
 
 def finite(part: Any) -> Any:  # noqa: ANN401 - any part of a document
@@ -133,14 +78,14 @@ def finite(part: Any) -> Any:  # noqa: ANN401 - any part of a document
             return part
 
 
-def _accuracy(one: MedianErrors) -> str:
+def _accuracy(one: simulation.MedianErrors) -> str:
     """The errors of both estimators: ``1.51 (12), 0.48``."""
     ours = "refused" if one.refused == one.trials else _number(one.ours_mm)
     paper = f"{_number(one.paper_mm)} ({one.settled})" if one.settled else "none"
     return f"{paper}, {ours}"
 
 
-def _in_full(one: MedianErrors) -> str:
+def _in_full(one: simulation.MedianErrors) -> str:
     """The errors with ours of the same draws between: ``1.51 (12), 0.48, 0.52``."""
     paper, _, ours = _accuracy(one).rpartition(", ")
     return f"{paper}, {_number(one.ours_there_mm)}, {ours}" if one.settled else f"{paper}, {ours}"
@@ -152,7 +97,7 @@ def _number(value: float) -> str:
     return f"{value:.0e}" if value < 1e-3 else f"{value:.2f}" if value < 100.0 else f"{value:.0f}"
 
 
-def study_picture(study: PaperStudy) -> str:
+def study_picture(study: simulation.PaperStudy) -> str:
     """Figures 4 and 5 beside each other: the largest error of a parameter by the number of points."""
     places = [(0.10 + 0.47 * place, 0.16, 0.40, 0.70) for place in range(len(study.figures))]
     figure, both = new_figure((7.0, 3.0), *places)
@@ -169,24 +114,24 @@ def study_picture(study: PaperStudy) -> str:
                 name = f"{estimator}, {'0.01 mm of noise' if noise == 'noisy' else 'no noise'}"
                 axes.semilogy(*columns(shown), marker + line, color=colour, label=name, markersize=4)
         label = "the paper of figure 4, 5 points, noise"
-        axes.axhline(PAPER_NOISY_MM, color="#888888", linewidth=0.6, label=label)
+        axes.axhline(simulation.PAPER_NOISY_MM, color="#888888", linewidth=0.6, label=label)
         axes.set_xticks(range(1, 6))
         axes.set_xlim(0.8, 5.2)
         axes.set_ylim(0.5 * SMALLEST_MM, 100.0)
         axes.set_xlabel("points")
-        axes.set_title(f"Figure {number}: {FIGURES[number]} orientations", fontsize=9)
+        axes.set_title(f"Figure {number}: {simulation.FIGURES[number]} orientations", fontsize=9)
     both[0].legend(frameon=False, fontsize=7)
     return as_svg(figure)
 
 
-def experiment_lines(study: ExperimentStudy) -> Iterator[str]:
+def experiment_lines(study: experiment.ExperimentStudy) -> Iterator[str]:
     """The whole of it, in lines of at most 80 columns."""
     yield wrapped(
         "Mean distance of the ball from its first place at a point, mm, and by what share it falls: "
-        f"{ORIENTATIONS} orientations within +-{AMPLITUDE_DEG:g} deg, medians of {study.rows[0].draws} "
-        "draws. P1 to P3 calibrate, P4 to P6 verify. P is the paper's estimator, which ends in so many; "
-        f"chosen: ours from as many orientations within +-{CHOSEN_WITHIN_DEG:g} deg that it chose itself. "
-        "The robot's geometry is what the paper identified; the first column is its repeatability, the "
+        f"{experiment.ORIENTATIONS} orientations within +-{experiment.AMPLITUDE_DEG:g} deg, medians of "
+        f"{study.rows[0].draws} draws. P1 to P3 calibrate, P4 to P6 verify. P is the paper's estimator, which ends in so many; "
+        f"chosen: ours from as many orientations within +-{experiment.CHOSEN_WITHIN_DEG:g} deg that it "
+        "chose itself. The robot's geometry is what the paper identified; the first column is its repeatability, the "
         "standard deviation of each coordinate of the ball."
     )
     yield ""
@@ -198,8 +143,8 @@ def experiment_lines(study: ExperimentStudy) -> Iterator[str]:
         yield f"  {row.repeatability_mm:<6g} {row.ended:<4} {both}".rstrip()
     yield ""
     yield wrapped(
-        f"The paper: more than {100 * PAPER_REDUCTION:.0f} percent less, with a repeatability of about "
-        f"{PAPER_REPEATABILITY_MM:g} mm; better with a better one."
+        f"The paper: more than {100 * experiment.PAPER_REDUCTION:.0f} percent less, with a repeatability of "
+        f"about {experiment.PAPER_REPEATABILITY_MM:g} mm; better with a better one."
     )
     coarsest = study.rows[-1]
     most = 100 * (1 - coarsest.floor_mm / coarsest.verifying.before)
@@ -209,13 +154,13 @@ def experiment_lines(study: ExperimentStudy) -> Iterator[str]:
         for row in reversed(study.rows)
     )
     yield wrapped(
-        f"Two places that scatter are {MEAN_DISTANCE:.2f} times the repeatability apart in the mean, "
-        f"whatever the geometry: at {coarsest.repeatability_mm:g} mm nobody can have more than {most:.0f} "
+        f"Two places that scatter are {experiment.MEAN_DISTANCE:.2f} times the repeatability apart in the "
+        f"mean, whatever the geometry: at {coarsest.repeatability_mm:g} mm nobody can have more than {most:.0f} "
         f"percent less. Ours (chosen) over that floor at P4 to P6: {ratios}."
     )
 
 
-def _reduction(one: Reduction) -> str:
+def _reduction(one: experiment.Reduction) -> str:
     paper, ours = (
         f"{value:.3f} -{100 * (1 - value / one.before):.1f}%" if isfinite(value) else "-"
         for value in (one.paper, one.ours)
@@ -223,7 +168,7 @@ def _reduction(one: Reduction) -> str:
     return f"{one.before:<6.2f} {paper:<11} {ours:<11} {one.chosen:.3f}"
 
 
-def experiment_picture(study: ExperimentStudy) -> str:
+def experiment_picture(study: experiment.ExperimentStudy) -> str:
     """Figures 8 and 9: each orientation's distance from the first, before and after, in one draw."""
     places = [(0.09 + 0.48 * place, 0.16, 0.42, 0.70) for place in range(2)]
     figure, both = new_figure((7.0, 3.0), *places)

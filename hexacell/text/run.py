@@ -6,12 +6,10 @@ from pathlib import Path
 from hexacell.errors import HexacellError
 from hexacell.services.run.calibration_run import RunRequest
 from hexacell.text.layout import duration, wrapped
-from hexacell.text.line_face import request_text
-from hexacell.text.screens.questions import question_view
+from hexacell.text.screens.views import QuestionView
 from hexacell.text.verdict import teaching_line
 from procedures.calibration.calibration import Mode
 from procedures.replay.replayer import Aspect, ReplayReport
-from procedures.run.questions import Question
 from procedures.steps import events
 
 REPEATED = "The check raised an alarm, which one unchanged machine in 100 does: it is made once more."
@@ -66,16 +64,15 @@ def closing_lines(request: RunRequest, ended: events.Ended) -> tuple[str, ...]:
     return (f"Everything about this run is in {request.folder.path}", *teaching, ended.line)
 
 
-def question_text(question: Question) -> str:
+def question_text(view: QuestionView) -> str:
     """The question for a terminal that reads one line as the answer, as the screen asks it.
 
     The change of a config comes first: what decides about it is then in sight beside the question.
     """
-    view, request = question_view(question, None), request_text(question)
     about = [text if "\n" in text else wrapped(text, indent=4) for text in view.paragraphs]
     if view.title.endswith("?"):
-        return "\n".join(["", *filter(None, [view.change]), *about, f"{view.title}\n{request}"])
-    return "\n".join(["", view.title, *about, request])
+        return "\n".join(["", *filter(None, [view.change]), *about, f"{view.title}\n{view.request}"])
+    return "\n".join(["", view.title, *about, view.request])
 
 
 def replay_report(replayed: ReplayReport) -> str:

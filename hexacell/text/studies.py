@@ -4,25 +4,17 @@ A new study is one more row at the end, and one of the command's arguments.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from math import isfinite
 from typing import Any, Generic, TypeVar
 
+from hexacell.study import paper_experiment as experiment
+from hexacell.study import paper_simulation as simulation
 from hexacell.study.design_records import PAPER_DEG, RANDOM_DEG, OrientationChoice
 from hexacell.study.design_study import DESIGN, DesignStudy, Spread
-from hexacell.study.paper_experiment import EXPERIMENT
-from hexacell.study.paper_simulation import PAPER
 from hexacell.study.tasks import Study
+from hexacell.text import paper_study
 from hexacell.text.layout import wrapped
-from hexacell.text.paper_study import (
-    experiment_document,
-    experiment_lines,
-    experiment_picture,
-    finite,
-    study_document,
-    study_lines,
-    study_picture,
-)
 from hexacell.text.svg_drawing import AFTER, BEFORE, INK, as_svg, columns, new_figure, plain_ticks
 
 WAYS = (
@@ -47,12 +39,17 @@ SummaryType = TypeVar("SummaryType")
 
 @dataclass(frozen=True, slots=True)
 class ShownStudy(Generic[SummaryType]):
-    """A study, and its summary as lines of text, as a JSON document and as a picture (SVG)."""
+    """A study, its summary as lines of text and as a picture (SVG), and what is stated beside it."""
 
     study: Study[Any, Any, SummaryType]
     lines: Callable[[SummaryType], Iterable[str]]
-    document: Callable[[SummaryType], dict[str, Any]]
     picture: Callable[[SummaryType], str]
+    stated: Mapping[str, object] = field(default_factory=dict)
+
+    def document(self, summary: Any) -> dict[str, Any]:  # noqa: ANN401 - a dataclass, as the study has it
+        """All figures as a JSON document; what is not finite is null."""
+        document: dict[str, Any] = paper_study.finite({**self.stated, **asdict(summary)})
+        return document
 
 
 def design_lines(study: DesignStudy) -> Iterator[str]:
@@ -84,12 +81,6 @@ def design_lines(study: DesignStudy) -> Iterator[str]:
 def _spread(one: Spread) -> str:
     error = f"{one.largest_mm:.3g} ({one.most_mm:.3g})"
     return f"{error:<16} {one.sigma_mm:<8.3g} {one.task_mm:<8.3g}"
-
-
-def design_document(study: DesignStudy) -> dict[str, Any]:
-    """All figures as a JSON document; what is not finite is null."""
-    document: dict[str, Any] = finite(asdict(study))
-    return document
 
 
 def design_picture(study: DesignStudy) -> str:
@@ -134,9 +125,31 @@ def _draw_sweep(axes: Any, name: str, rows: Mapping[float, Spread]) -> None:  # 
 
 
 _ROWS: tuple[ShownStudy[Any], ...] = (
-    ShownStudy(PAPER, study_lines, study_document, study_picture),
-    ShownStudy(EXPERIMENT, experiment_lines, experiment_document, experiment_picture),
-    ShownStudy(DESIGN, design_lines, design_document, design_picture),
+    ShownStudy(
+        simulation.PAPER,
+        paper_study.study_lines,
+        paper_study.study_picture,
+        {
+            "noise_mm": simulation.NOISE_MM,
+            "paper": {
+                "exact_mm": simulation.PAPER_EXACT_MM,
+                "noisy_mm": simulation.PAPER_NOISY_MM,
+                "table_2_mm": simulation.PAPER_TABLE_2_MM,
+            },
+        },
+    ),
+    ShownStudy(
+        experiment.EXPERIMENT,
+        paper_study.experiment_lines,
+        paper_study.experiment_picture,
+        {
+            "paper": {
+                "reduction": experiment.PAPER_REDUCTION,
+                "repeatability_mm": experiment.PAPER_REPEATABILITY_MM,
+            }
+        },
+    ),
+    ShownStudy(DESIGN, design_lines, design_picture),
 )
 
 STUDIES: Mapping[str, ShownStudy[Any]] = {row.study.name: row for row in _ROWS}

@@ -23,6 +23,33 @@ class Parser(argparse.ArgumentParser):
         """Raise ``UsageError`` with argparse's message."""
         raise UsageError(message, action=f"Try `{self.prog} --help`")
 
+    def add_cell(self) -> None:
+        """Add the cell file."""
+        self.add_argument("cell", type=Path, metavar="CELL", help="the cell file (TOML)")
+
+    def add_run(self, what: str = "a run folder") -> None:
+        """Add the run."""
+        self.add_argument("run", type=Path, metavar="RUN", help=what)
+
+    def add_file(self, option: str, what: str, *, is_required: bool = False) -> None:
+        """Add an option that names a file."""
+        self.add_argument(option, type=Path, required=is_required, metavar="FILE", help=what)
+
+    def add_archive(self, what: str) -> None:
+        """Add the address of an archive that cells share."""
+        self.add_argument("--archive", metavar="URL", help=what)
+
+    def add_json(self) -> None:
+        """Add the choice of a JSON document."""
+        self.add_argument(
+            "--json", action="store_true", help="one JSON document on stdout; text goes to stderr"
+        )
+
+    def add_resume(self, what: str) -> None:
+        """Add the run to resume, the latest one by default."""
+        words = f"resume an interrupted {what}: its folder or name (default: the latest one)"
+        self.add_argument("--resume", metavar="RUN", nargs="?", const="latest", help=words)
+
 
 def add_parser(commands: Any, name: str, summary: str) -> Parser:  # noqa: ANN401 - argparse's own type is private
     """Add a command, or one of a command, with a summary that is its description, too."""
@@ -52,44 +79,6 @@ def add_command(commands: Any, name: str, summary: str, target: str = "") -> Par
     parser = add_parser(commands, name, summary)
     parser.set_defaults(target=target or f"{name}.main")
     return parser
-
-
-def add_cell(parser: Parser) -> None:
-    """Add the cell file."""
-    parser.add_argument("cell", type=Path, metavar="CELL", help="the cell file (TOML)")
-
-
-def add_run(parser: Parser, what: str = "a run folder") -> None:
-    """Add the run."""
-    parser.add_argument("run", type=Path, metavar="RUN", help=what)
-
-
-def add_file(parser: Parser, option: str, what: str, *, is_required: bool = False) -> None:
-    """Add an option that names a file."""
-    parser.add_argument(option, type=Path, required=is_required, metavar="FILE", help=what)
-
-
-def add_archive(parser: Parser, what: str) -> None:
-    """Add the address of an archive that cells share."""
-    parser.add_argument("--archive", metavar="URL", help=what)
-
-
-def add_json(parser: Parser) -> None:
-    """Add the choice of a JSON document."""
-    parser.add_argument(
-        "--json", action="store_true", help="one JSON document on stdout; text goes to stderr"
-    )
-
-
-def add_resume(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add the run to resume, the latest one by default."""
-    parser.add_argument(
-        "--resume",
-        metavar="RUN",
-        nargs="?",
-        const="latest",
-        help=f"resume an interrupted {what}: its folder or name (default: the latest one)",
-    )
 
 
 def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:

@@ -6,13 +6,8 @@ from typing import Any
 from hexacell.cli.arguments.commands import (
     LARGEST_NODE_ID,
     Parser,
-    add_archive,
-    add_cell,
     add_command,
-    add_file,
-    add_json,
     add_parser,
-    add_run,
     bounded_seconds,
     whole_number,
 )
@@ -69,7 +64,7 @@ def _devices(commands: Any) -> None:  # noqa: ANN401
         metavar="ID",
         help="give the only device on a CAN bus this node id (LSS), after a question",
     )
-    add_file(parser, "--write", "write a cell file: what was found, and your answers to the rest")
+    parser.add_file("--write", "write a cell file: what was found, and your answers to the rest")
     parser.add_argument("--diagnose", metavar="NAME", help="watch a gauge, or encoders, of --cell")
     parser.add_argument("--cell", type=Path, metavar="CELL", help="the cell file (TOML) of --diagnose")
     parser.add_argument(
@@ -79,7 +74,7 @@ def _devices(commands: Any) -> None:  # noqa: ANN401
         metavar="S",
         help="how long --diagnose watches (default: %(default)s)",
     )
-    add_json(parser)
+    parser.add_json()
 
 
 def _schedule(commands: Any) -> None:  # noqa: ANN401
@@ -89,7 +84,7 @@ def _schedule(commands: Any) -> None:  # noqa: ANN401
         "have a cell checked each day: systemd units or a crontab line",
         "unattended.schedule",
     )
-    add_cell(parser)
+    parser.add_cell()
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--daily", metavar="HH:MM", help="write the units: a run each day at this time")
     what.add_argument("--show", action="store_true", help="show the units of this cell")
@@ -102,51 +97,51 @@ def _schedule(commands: Any) -> None:  # noqa: ANN401
         "and apply only within the limits",
     )
     parser.add_argument("--on-failure", metavar="UNIT", help="unit that systemd starts after a failure")
-    add_file(parser, "--metrics", "write metrics of the cell there after each run")
+    parser.add_file("--metrics", "write metrics of the cell there after each run")
     parser.add_argument("--cron", action="store_true", help="print a crontab line instead")
     parser.add_argument("--folder", type=Path, metavar="FOLDER", help="where the units are, if elsewhere")
-    add_json(parser)
+    parser.add_json()
 
 
 def _status(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(commands, "status", "all cells at a glance: verdicts, and what waits for a person")
     parser.add_argument("cells", type=Path, nargs="*", metavar="CELL", help="cell files (TOML)")
-    add_archive(parser, "instead of cell files: all cells that share this archive")
-    add_file(parser, "--metrics", "write it as metrics for Prometheus' node exporter too")
-    add_json(parser)
+    parser.add_archive("instead of cell files: all cells that share this archive")
+    parser.add_file("--metrics", "write it as metrics for Prometheus' node exporter too")
+    parser.add_json()
 
 
 def _notify(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(
         commands, "notify", "who hears of unattended runs: list, try, send what waits", "unattended.notify"
     )
-    add_cell(parser)
+    parser.add_cell()
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--test", action="store_true", help="notify everybody of a test now")
     what.add_argument("--send", action="store_true", help="send what earlier runs could not")
-    add_json(parser)
+    parser.add_json()
 
 
 def _serve(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(
         commands, "serve", "serve the results of a cell by OPC UA until interrupted", "serve.results"
     )
-    add_cell(parser)
+    parser.add_cell()
 
 
 def _cell(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(commands, "cell", "validate or show a cell file, or print its schema")
     actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True, dest="action")
     validate = add_parser(actions, "validate", "check it; every mistake with its line")
-    add_cell(validate)
-    add_json(validate)
+    validate.add_cell()
+    validate.add_json()
     schema = add_parser(
         actions, "schema", "print the JSON Schema of cell files, for editors and other programs"
     )
-    add_json(schema)
+    schema.add_json()
     show = add_parser(actions, "show", "print it with defaults filled in, and the origin of each value")
-    add_cell(show)
-    add_json(show)
+    show.add_cell()
+    show.add_json()
 
 
 def _completion(commands: Any) -> None:  # noqa: ANN401
@@ -160,23 +155,23 @@ def _apply(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(
         commands, "apply", "write the proposal of a run into the controller's config", "config.apply_run"
     )
-    add_run(parser)
+    parser.add_run()
     _add_reason(parser)
-    add_json(parser)
+    parser.add_json()
 
 
 def _rollback(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(
         commands, "rollback", "undo what was written into the controller's config", "config.rollback_config"
     )
-    add_cell(parser)
+    parser.add_cell()
     parser.add_argument(
         "--to",
         metavar="RUN",
         help="restore what this run wrote, by its folder or name (default: undo the latest write)",
     )
     _add_reason(parser)
-    add_json(parser)
+    parser.add_json()
 
 
 def _add_reason(parser: Parser) -> None:
@@ -216,19 +211,18 @@ def _history(commands: Any) -> None:  # noqa: ANN401
         help="every write into the controller's config: when, who, what and why",
     )
     parser.add_argument("--delete", action="store_true", help="with --keep: delete those")
-    add_archive(
-        parser, "the index over the runs: postgresql://user@host/database (default: as [archive] has it)"
+    parser.add_archive(
+        "the index over the runs: postgresql://user@host/database (default: as [archive] has it)"
     )
-    add_json(parser)
+    parser.add_json()
 
 
 def _report(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(
         commands, "report", "write the report of a run: one file to read, print and file", "recorded.report"
     )
-    add_run(parser)
-    add_file(
-        parser,
+    parser.add_run()
+    parser.add_file(
         "--output",
         "where to (default: report.html in the run folder); .pdf gives PDF/A, .xml a Digital Calibration "
         "Certificate",
@@ -236,4 +230,4 @@ def _report(commands: Any) -> None:  # noqa: ANN401
     parser.add_argument(
         "--compare", type=Path, metavar="RUN", help="say also what has changed since this run, a folder"
     )
-    add_json(parser)
+    parser.add_json()

@@ -3,16 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from hexacell.cli.arguments.commands import (
-    add_cell,
-    add_command,
-    add_file,
-    add_json,
-    add_parser,
-    add_resume,
-    add_run,
-    whole_number,
-)
+from hexacell.cli.arguments.commands import add_command, add_parser, whole_number
 
 
 def add_run_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
@@ -38,13 +29,13 @@ def _demo(commands: Any) -> None:  # noqa: ANN401
         metavar="FOLDER",
         help="where to work; an earlier demo there is replaced (default: %(default)s)",
     )
-    add_json(parser)
+    parser.add_json()
 
 
 def _run(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(commands, "run", "measure, identify, propose, write back and verify")
-    add_cell(parser)
-    add_resume(parser, "run")
+    parser.add_cell()
+    parser.add_resume("run")
     parser.add_argument("--unattended", action="store_true", help="no person can place gauges or approve")
     parser.add_argument(
         "--mode",
@@ -59,30 +50,30 @@ def _run(commands: Any) -> None:  # noqa: ANN401
         help="check the length scale before the verdict, with the fixture of [length_check]; a resumed run "
         "has it if it was begun with it",
     )
-    add_file(parser, "--events", "write each event there, as a line of JSON, as it happens")
-    add_json(parser)
+    parser.add_file("--events", "write each event there, as a line of JSON, as it happens")
+    parser.add_json()
 
 
 def _tui(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(commands, "tui", "the technician's screen: measure, review, approve, roll back")
-    add_cell(parser)
+    parser.add_cell()
 
 
 def _length(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(
         commands, "length", "check the scale of the encoders against a known length", "run.length"
     )
-    add_cell(parser)
-    add_resume(parser, "check")
+    parser.add_cell()
+    parser.add_resume("check")
     parser.add_argument("--unattended", action="store_true", help="no person can mount the gauges")
-    add_json(parser)
+    parser.add_json()
 
 
 def _preflight(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(
         commands, "preflight", "check everything that must hold before motion; moves nothing"
     )
-    add_cell(parser)
+    parser.add_cell()
     parser.add_argument("--unattended", action="store_true", help="check also that no person is needed")
     parser.add_argument(
         "--mode",
@@ -90,7 +81,7 @@ def _preflight(commands: Any) -> None:  # noqa: ANN401
         default="optimise",
         help="of the run: a calibration (default), or the quick level from the last result on",
     )
-    add_json(parser)
+    parser.add_json()
 
 
 def _simulate(commands: Any) -> None:  # noqa: ANN401
@@ -100,8 +91,8 @@ def _simulate(commands: Any) -> None:  # noqa: ANN401
         "serve a simulated cell to other processes until interrupted",
         "serve.simulate",
     )
-    add_cell(parser)
-    add_file(parser, "--output", "write the cell file for `run` there instead of to stdout")
+    parser.add_cell()
+    parser.add_file("--output", "write the cell file for `run` there instead of to stdout")
     parser.add_argument(
         "--fault",
         action="append",
@@ -115,7 +106,7 @@ def _host(commands: Any) -> None:  # noqa: ANN401
     """The process of a run. People never type it, so the help does not list it."""
     parser = commands.add_parser("host")
     parser.set_defaults(target="host.main")
-    add_cell(parser)
+    parser.add_cell()
     parser.add_argument("--folder", type=Path, required=True)
     parser.add_argument("--mode", choices=("check", "quick", "optimise", "length"), required=True)
     parser.add_argument("--resume", action="store_true")
@@ -124,8 +115,8 @@ def _host(commands: Any) -> None:  # noqa: ANN401
 
 def _next(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(commands, "next", "print the pose worth measuring next", "records.propose_next")
-    add_cell(parser)
-    add_file(parser, "--measurements", "the records so far (CSV)", is_required=True)
+    parser.add_cell()
+    parser.add_file("--measurements", "the records so far (CSV)", is_required=True)
     parser.add_argument(
         "--refused",
         type=whole_number(0),
@@ -133,19 +124,19 @@ def _next(commands: Any) -> None:  # noqa: ANN401
         metavar="N",
         help="how many poses at this point could not be measured; proposes another",
     )
-    add_json(parser)
+    parser.add_json()
 
 
 def _fit(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(commands, "fit", "identify the geometry from a measurement file", "records.fit")
-    add_cell(parser)
-    add_file(parser, "--measurements", "the records (CSV)", is_required=True)
+    parser.add_cell()
+    parser.add_file("--measurements", "the records (CSV)", is_required=True)
     parser.add_argument(
         "--identify",
         choices=("all", "zeros"),
         help="all parameters, or the encoders' zeros alone (default: as the cell file says)",
     )
-    add_json(parser)
+    parser.add_json()
 
 
 def _replay(commands: Any) -> None:  # noqa: ANN401
@@ -155,7 +146,7 @@ def _replay(commands: Any) -> None:  # noqa: ANN401
         "repeat a recorded run's decisions and results, and compare",
         "recorded.replay_run",
     )
-    add_run(parser, "a run folder, or a journal")
+    parser.add_run("a run folder, or a journal")
     parser.add_argument(
         "--only",
         choices=("decisions", "results", "identification"),
@@ -173,7 +164,7 @@ def _replay(commands: Any) -> None:  # noqa: ANN401
         metavar="FOLDER",
         help="replay nothing; copy the run folder there with every password masked, to be given to others",
     )
-    add_json(parser)
+    parser.add_json()
 
 
 _EACH_CASE = "of orientations and noise, for each case"
@@ -217,4 +208,4 @@ def _add_study(studies: Any, name: str, summary: str, drawn: str) -> None:  # no
         help="keeps each result, so that a study can be interrupted, and gets a picture "
         "(default: %(default)s)",
     )
-    add_json(parser)
+    parser.add_json()

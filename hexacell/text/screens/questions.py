@@ -20,19 +20,22 @@ RECOVERIES = {
 }
 
 
-def question_view(question: questions.Question, live: LiveSnapshot | None) -> QuestionView:
-    """A question with what is to be known for it."""
+def question_view(
+    question: questions.Question, live: LiveSnapshot | None, person: str = PERSON
+) -> QuestionView:
+    """A question with what is to be known for it; ``person`` is who answers it."""
     match question.subject:
         case questions.GaugePlacement() as place:
             return _placement(place, live)
         case questions.PendingChange(gates=gates, displacement=moved, improvement=improvement) as pending:
             facts = (gate_lines(gates), improvement_sentence(improvement), teaching_sentence(moved))
-            view = _consenting(question, "write it", "Write the new geometry into the controller's config?")
+            title = "Write the new geometry into the controller's config?"
+            view = _consenting(question, person, "write it", title)
             change, refusal = f"The change:\n{pending_text(pending)}", approval_refusal(gates)
             return replace(view, paragraphs=tuple(filter(None, facts)), change=change, refusal=refusal)
         case questions.WrittenResult(line=line, displacement=moved):
             title, otherwise = "The result did not pass. Keep it all the same?", "restore the old config"
-            view = _consenting(question, "keep it", title, otherwise)
+            view = _consenting(question, person, "keep it", title, otherwise)
             stands = (
                 "The new geometry is in the controller's config. Without your word the old one is restored."
             )
@@ -97,15 +100,19 @@ def approval_refusal(gates: tuple[AcceptanceGate, ...]) -> str:
 
 
 def _consenting(
-    question: questions.Question, what: str, title: str, otherwise: str = "leave the config as it is"
+    question: questions.Question,
+    person: str,
+    what: str,
+    title: str,
+    otherwise: str = "leave the config as it is",
 ) -> QuestionView:
     """A question of consent: by one key, or by the cell's name where it is grave."""
     decline = Choice("n", f"no, {otherwise}", None)
     if question.consent == "yes":
-        consent = Choice("y", f"yes, {what}", PERSON, is_consent=True)
+        consent = Choice("y", f"yes, {what}", person, is_consent=True)
         return QuestionView(title, (), "Press y or n; page up and page down scroll.", (consent, decline))
     instruction = (
         f"Type the cell's name, {question.consent}, and Enter to take the responsibility. "
         "Tab, then n declines; page up and page down scroll."
     )
-    return QuestionView(title, (), instruction, (decline,), typed=question.consent, consent=PERSON)
+    return QuestionView(title, (), instruction, (decline,), typed=question.consent, consent=person)

@@ -75,6 +75,16 @@ class Choice:
     value: str | None
     is_consent: bool = False
 
+    @property
+    def word(self) -> str:
+        """What is typed for it at a plain terminal, beside its key."""
+        return self.label.partition(":")[0].partition(",")[0]
+
+    def is_meant(self, typed: str) -> bool:
+        """Whether a typed word means it; consent is typed in full, others may be shortened."""
+        is_begun = bool(typed) and self.word.startswith(typed) and not self.is_consent
+        return (typed or "enter") in {self.key, self.word} or is_begun
+
 
 @dataclass(frozen=True, slots=True)
 class QuestionView:
@@ -101,6 +111,25 @@ class QuestionView:
     refusal: str = ""
     shows_gauges: bool = False
     urgency: Urgency = Urgency.ATTENTION
+
+    def typed_choice(self, line: str) -> Choice | None:
+        """The choice that a line typed at a plain terminal means, None if it means none."""
+        typed = line.strip().lower()
+        if self.typed and typed == self.typed.lower():
+            return Choice("", self.typed, self.consent, is_consent=True)
+        meant = [one for one in self.choices if one.is_meant(typed.replace(" ", "-"))]
+        return meant[0] if len(meant) == 1 else None
+
+    @property
+    def request(self) -> str:
+        """What to type at a plain terminal."""
+        words = [one.word for one in self.choices]
+        if self.typed:
+            return f"Type the cell's name, {self.typed}, to take the responsibility, or no: "
+        if self.choices[0].key == "enter":
+            return "Press Enter when they are in place, or type a to abort: "
+        several = f"one of {', '.join(words)}"
+        return f"Type {' or '.join(words) if len(words) == 2 else several}: "
 
 
 @dataclass(frozen=True, slots=True)

@@ -73,8 +73,8 @@ def test_medians_are_of_the_draws_that_each_estimator_ends() -> None:
 def test_after_some_steps_a_draw_that_came_to_its_end_before_counts_with_that() -> None:
     steps = [9.0, 5.0, 1.0, 0.5]
     found = MedianErrors.of([errors(0.5, 0.1, *steps), errors(0.5, 0.1, *steps), errors(None, 0.1, 7.0)])
-    assert found.after_steps_mm == (1.0, 0.5, 0.5)
-    assert MedianErrors.of([errors(None, 0.1, 7.0)]).after_steps_mm == (inf, inf, inf)
+    assert tuple(found.after_steps_mm.values()) == (1.0, 0.5, 0.5)
+    assert {*MedianErrors.of([errors(None, 0.1, 7.0)]).after_steps_mm.values()} == {inf}
 
 
 def test_all_of_it_is_of_its_own_trials() -> None:
@@ -91,4 +91,8 @@ def test_all_of_it_is_of_its_own_trials() -> None:
     assert [one.deviation_mm for one in study.figures[5]] == [10, 20, 30, 40, 50]
     assert [one.exact.ours_mm for one in study.sweep] == [10] * 3 + [20] * 3 + [30] * 3 + [40] * 3
     assert [one.angles for one in study.sweep[:3]] == list(Angles)
-    assert study.table_2 == {"S": (11.0, 0.1), "B": (0.1, 0.1), "l": (0.1, 0.1)}
+    assert {kind: tuple(found.values()) for kind, found in study.table_2.items()} == {
+        "S": (11.0, 0.1),
+        "B": (0.1, 0.1),
+        "l": (0.1, 0.1),
+    }

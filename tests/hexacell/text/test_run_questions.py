@@ -4,8 +4,8 @@ from drivers.interfaces import StartupAction
 from hexacell.cell.recovery import Action
 from hexacell.kinematics.pose import Pose
 from hexacell.results.written_geometry import TaskDisplacement
-from hexacell.text.line_face import TypedAnswer, request_text, typed_answer
 from hexacell.text.run import question_text
+from hexacell.text.screens.questions import question_view
 from hexacell.text.verdict import teaching_sentence
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import Verdict
@@ -36,7 +36,7 @@ def test_approval_and_acceptance_say_what_must_be_taught_anew_before_it_asks() -
     whether_written = ask_approval([], "-1\n+2", moved, cell="bench")
     whether_kept = ask_acceptance("all ill", Verification(verdict=Verdict.FAIL), moved)
     for question, asks in ((whether_written, "Write the new"), (whether_kept, "The result did not pass.")):
-        *about, asked, request = question_text(question).splitlines()
+        *about, asked, request = question_text(question_view(question, None)).splitlines()
         assert teaching_sentence(moved) in " ".join(line.strip() for line in about)
         assert asked.startswith(asks)
         assert request == "Type yes or no: "
@@ -57,23 +57,30 @@ def test_what_a_question_offers_is_an_answer_and_nothing_else() -> None:
         ),
         (GRAVE, {"bench\n": "somebody", "no\n": None}, ("\n", "yes\n", "y\n", "benc\n")),
     ]
-    assert request_text(FAILURE) == "Type one of retry, measure-again, redo-set, abort: "
+    assert question_view(FAILURE, None).request == "Type one of retry, measure-again, redo-set, abort: "
     what = "The robot stands still: this went wrong"
-    assert question_text(FAILURE) == f"\n{what}\nIt broke.\n{request_text(FAILURE)}"
+    assert (
+        question_text(question_view(FAILURE, None))
+        == f"\n{what}\nIt broke.\n{question_view(FAILURE, None).request}"
+    )
     for question, answers, others in offered:
         for typed, answer in answers.items():
-            assert typed_answer(typed, question, "somebody") == TypedAnswer(answer)
+            choice = question_view(question, None, "somebody").typed_choice(typed)
+            assert choice is not None
+            assert choice.value == answer
         for typed in others:
-            assert typed_answer(typed, question, "somebody") is None
+            assert question_view(question, None).typed_choice(typed) is None
 
 
 def test_the_controller_is_made_ready_on_an_explicit_yes_only() -> None:
     question = ask_startup(StartupAction.HOME, "controller: is not homed", is_theirs=False)
-    assert question_text(question) == (
+    assert question_text(question_view(question, None)) == (
         "\nThe controller is not ready\ncontroller: is not homed.\n"
         "Is its way free? Home it, which moves the machine?\nType yes or no: "
     )
     for typed, answer in (("y", YES), ("Yes", YES), ("n", NO), ("no", NO)):
-        assert typed_answer(typed, question, "a person") == TypedAnswer(answer)
+        choice = question_view(question, None).typed_choice(typed)
+        assert choice is not None
+        assert choice.value == answer
     for typed in ("", "a", "m", "home", "yes please"):
-        assert typed_answer(typed, question, "a person") is None
+        assert question_view(question, None).typed_choice(typed) is None

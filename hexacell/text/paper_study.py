@@ -34,10 +34,10 @@ def study_lines(study: simulation.PaperStudy) -> Iterator[str]:
         yield ""
         first = sets[0]
         yield wrapped(
-            f"Figure {figure}: largest error of a parameter, mm; {simulation.FIGURES[figure]} orientations at "
-            f"each point, +-{first.amplitude_deg:g} deg; medians of {first.noisy.trials} draws. P is the "
-            "paper's estimator, in brackets in how many draws it comes to an end; then ours of the same "
-            "draws, and of all. The deviation is what gauges would have to show."
+            f"Figure {figure}: largest error of a parameter, mm; {simulation.FIGURES[figure]} "
+            f"orientations at each point, +-{first.amplitude_deg:g} deg; medians of {first.noisy.trials} "
+            "draws. P is the paper's estimator, in brackets in how many draws it comes to an end; then "
+            "ours of the same draws, and of all. The deviation is what gauges would have to show."
         )
         yield HEAD
         for one in sets:
@@ -129,10 +129,11 @@ def experiment_lines(study: experiment.ExperimentStudy) -> Iterator[str]:
     yield wrapped(
         "Mean distance of the ball from its first place at a point, mm, and by what share it falls: "
         f"{experiment.ORIENTATIONS} orientations within +-{experiment.AMPLITUDE_DEG:g} deg, medians of "
-        f"{study.rows[0].draws} draws. P1 to P3 calibrate, P4 to P6 verify. P is the paper's estimator, which ends in so many; "
-        f"chosen: ours from as many orientations within +-{experiment.CHOSEN_WITHIN_DEG:g} deg that it "
-        "chose itself. The robot's geometry is what the paper identified; the first column is its repeatability, the "
-        "standard deviation of each coordinate of the ball."
+        f"{study.rows[0].draws} draws. P1 to P3 calibrate, P4 to P6 verify. P is the paper's estimator, "
+        "which ends in so many; chosen: ours from as many orientations within "
+        f"+-{experiment.CHOSEN_WITHIN_DEG:g} deg that it chose itself. The robot's geometry is what the "
+        "paper identified; the first column is its repeatability, the standard deviation of each "
+        "coordinate of the ball."
     )
     yield ""
     yield f"  {'':<11} {'P1 to P3':<38} P4 to P6"
@@ -143,8 +144,8 @@ def experiment_lines(study: experiment.ExperimentStudy) -> Iterator[str]:
         yield f"  {row.repeatability_mm:<6g} {row.ended:<4} {both}".rstrip()
     yield ""
     yield wrapped(
-        f"The paper: more than {100 * experiment.PAPER_REDUCTION:.0f} percent less, with a repeatability of "
-        f"about {experiment.PAPER_REPEATABILITY_MM:g} mm; better with a better one."
+        f"The paper: more than {100 * experiment.PAPER_REDUCTION:.0f} percent less, with a repeatability "
+        f"of about {experiment.PAPER_REPEATABILITY_MM:g} mm; better with a better one."
     )
     coarsest = study.rows[-1]
     most = 100 * (1 - coarsest.floor_mm / coarsest.verifying.before)
@@ -155,8 +156,8 @@ def experiment_lines(study: experiment.ExperimentStudy) -> Iterator[str]:
     )
     yield wrapped(
         f"Two places that scatter are {experiment.MEAN_DISTANCE:.2f} times the repeatability apart in the "
-        f"mean, whatever the geometry: at {coarsest.repeatability_mm:g} mm nobody can have more than {most:.0f} "
-        f"percent less. Ours (chosen) over that floor at P4 to P6: {ratios}."
+        f"mean, whatever the geometry: at {coarsest.repeatability_mm:g} mm nobody can have more than "
+        f"{most:.0f} percent less. Ours (chosen) over that floor at P4 to P6: {ratios}."
     )
 
 

@@ -11,7 +11,6 @@ from markupsafe import Markup
 from hexacell import __version__
 from hexacell.errors import UsageError
 from hexacell.services.history.reported_run import ReportedRun
-from hexacell.services.history.run_summary import judged_accuracy
 from hexacell.text.parameters import rows_of_run
 from hexacell.text.report.pages import rendered
 from hexacell.text.report.report import instruments, temperature_ranges
@@ -57,7 +56,7 @@ def certificate_of_run(run: ReportedRun) -> bytes:
         UsageError: nothing was found of the errors at the task poses, or the cell file left out who
             calibrates what for whom.
     """
-    accuracy, stated = judged_accuracy(run.state.judged), run.settings.report
+    accuracy, stated = run.state.accuracy, run.settings.report
     if accuracy is None:
         raise UsageError(
             "the run has no result on the errors at the task poses, so that nothing can be certified",
@@ -71,7 +70,7 @@ def certificate_of_run(run: ReportedRun) -> bytes:
             subject=run.name,
             action="Write them in [report] of the cell file; runs that begin afterwards have them",
         )
-    verdict = run.state.judged.verdict if run.state.judged is not None else Verdict.NOT_EVALUATED
+    verdict = run.state.verdict or Verdict.NOT_EVALUATED
     program, _, program_version = run.started.software.partition(" ")
     text = rendered(
         "certificate.xml.j2",

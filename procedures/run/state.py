@@ -17,6 +17,8 @@ from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
 from procedures.run.readings import Reading
 
 if TYPE_CHECKING:  # a state keeps events whole, and needs their names in its annotations alone
+    from hexacell.checks.change_alarm import ChangeAlarm
+    from hexacell.verdict.decision import Verdict, VerifiedAccuracy
     from procedures.steps.accept import ResultAccepted
     from procedures.steps.assess_noise import NoiseMeasured
     from procedures.steps.base import BaseEvent, BaseStep
@@ -259,6 +261,23 @@ class RunState:
                 if temperature.celsius is not None:
                     shown.setdefault(temperature.name, []).append(temperature.celsius)
         return max((max(values) - min(values) for values in shown.values()), default=None)
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """The verdict, if there is one."""
+        return self.judged.verdict if self.judged else None
+
+    @property
+    def accuracy(self) -> VerifiedAccuracy | None:
+        """The errors at the task poses that the verdict is on; None without such a verdict."""
+        found = self.judged and (self.judged.verification or self.judged.check)
+        return found.accuracy if found else None
+
+    @property
+    def alarm(self) -> ChangeAlarm | None:
+        """The alarm that a check raised, if any."""
+        alarm = self.judged and self.judged.check and self.judged.check.alarm
+        return alarm if alarm and alarm.is_raised else None
 
     @property
     def left_travel(self) -> bool:

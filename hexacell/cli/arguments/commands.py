@@ -8,6 +8,8 @@ from typing import Any, NoReturn
 from hexacell.errors import UsageError
 
 LARGEST_NODE_ID = 127
+LONGEST_S = 86_400.0
+MODES = ("check", "quick", "optimise")
 
 
 class Parser(argparse.ArgumentParser):
@@ -31,24 +33,41 @@ class Parser(argparse.ArgumentParser):
         """Add the run."""
         self.add_argument("run", type=Path, metavar="RUN", help=what)
 
-    def add_file(self, option: str, what: str, *, is_required: bool = False) -> None:
-        """Add an option that names a file."""
-        self.add_argument(option, type=Path, required=is_required, metavar="FILE", help=what)
-
     def add_archive(self, what: str) -> None:
         """Add the address of an archive that cells share."""
-        self.add_argument("--archive", metavar="URL", help=what)
+        add_value(self, "--archive", "URL", what)
 
     def add_json(self) -> None:
         """Add the choice of a JSON document."""
-        self.add_argument(
-            "--json", action="store_true", help="one JSON document on stdout; text goes to stderr"
-        )
+        add_flag(self, "--json", "one JSON document on stdout; text goes to stderr")
 
     def add_resume(self, what: str) -> None:
         """Add the run to resume, the latest one by default."""
         words = f"resume an interrupted {what}: its folder or name (default: the latest one)"
         self.add_argument("--resume", metavar="RUN", nargs="?", const="latest", help=words)
+
+
+def add_flag(container: Any, option: str, what: str) -> None:  # noqa: ANN401 - a parser, or a group of one
+    """Add an option without a value."""
+    container.add_argument(option, action="store_true", help=what)
+
+
+def add_value(
+    container: Any,  # noqa: ANN401 - a parser, or a group of one
+    option: str,
+    metavar: str,
+    what: str,
+    kind: Callable[[str], object] = str,
+    default: object = None,
+) -> None:
+    """Add an option with one value; a default that is not None is in the help too."""
+    shown = "" if default is None else " (default: %(default)s)"
+    container.add_argument(option, type=kind, default=default, metavar=metavar, help=f"{what}{shown}")
+
+
+def add_file(parser: Parser, option: str, what: str) -> None:
+    """Add an option that names a file."""
+    add_value(parser, option, "FILE", what, Path)
 
 
 def add_parser(commands: Any, name: str, summary: str) -> Parser:  # noqa: ANN401 - argparse's own type is private
@@ -57,20 +76,10 @@ def add_parser(commands: Any, name: str, summary: str) -> Parser:  # noqa: ANN40
         name, help=summary, description=summary[0].upper() + summary[1:] + "."
     )
     # Suppressed defaults: the options of an action must not hide those given before its name.
-    parser.add_argument(
-        "--log-file",
-        type=Path,
-        default=argparse.SUPPRESS,
-        metavar="FILE",
-        help="append to this file what the program does; with -v also the bytes on the lines",
-    )
-    parser.add_argument(
-        "-v",
-        "--verbose",
-        action="count",
-        default=argparse.SUPPRESS,
-        help="log on stderr what the program does; twice: also the bytes on the lines",
-    )
+    words = "append to this file what the program does; with -v also the bytes on the lines"
+    parser.add_argument("--log-file", type=Path, default=argparse.SUPPRESS, metavar="FILE", help=words)
+    words = "log on stderr what the program does; twice: also the bytes on the lines"
+    parser.add_argument("-v", "--verbose", action="count", default=argparse.SUPPRESS, help=words)
     return parser
 
 
@@ -92,9 +101,6 @@ def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:
 
     read.__name__ = f"number from {least}{'' if most is None else f' to {most}'}"
     return read
-
-
-LONGEST_S = 86_400.0
 
 
 def bounded_seconds(text: str) -> float:

@@ -5,9 +5,13 @@ from typing import Any
 
 from hexacell.cli.arguments.commands import (
     LARGEST_NODE_ID,
+    MODES,
     Parser,
     add_command,
+    add_file,
+    add_flag,
     add_parser,
+    add_value,
     bounded_seconds,
     whole_number,
 )
@@ -17,89 +21,49 @@ SHELLS = ("bash", "zsh", "fish")
 
 def add_operation_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
     """Add these commands to a parser."""
-    for add in (
-        _apply,
-        _rollback,
-        _history,
-        _report,
-        _devices,
-        _schedule,
-        _status,
-        _notify,
-        _serve,
-        _cell,
-        _completion,
-    ):
+    results = (_apply, _rollback, _history, _report)
+    for add in (*results, _devices, _schedule, _status, _notify, _serve, _cell, _completion):
         add(commands)
 
 
 def _devices(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(commands, "devices", "find gauges, encoders, a controller; text for a cell file")
-    parser.add_argument(
-        "ports", nargs="*", metavar="PORT", help="serial ports or URLs (default: all of this computer)"
+    words = "serial ports or URLs (default: all of this computer)"
+    parser.add_argument("ports", nargs="*", metavar="PORT", help=words)
+    words = "a CAN bus, such as interface=slcan,channel=/dev/ttyACM0,bitrate=500000"
+    parser.add_argument("--can", action="append", default=[], metavar="BUS", help=words)
+    add_value(parser, "--bitrate", "BIT/S", "of CAN adapters that are found", int, 500_000)
+    add_value(
+        parser, "--controller", "HOST:PORT", "where LinuxCNC's server may be", default="127.0.0.1:5007"
     )
-    parser.add_argument(
-        "--can",
-        action="append",
-        default=[],
-        metavar="BUS",
-        help="a CAN bus, such as interface=slcan,channel=/dev/ttyACM0,bitrate=500000",
-    )
-    parser.add_argument(
-        "--bitrate",
-        type=int,
-        default=500_000,
-        metavar="BIT/S",
-        help="of CAN adapters that are found (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--controller",
-        default="127.0.0.1:5007",
-        metavar="HOST:PORT",
-        help="where LinuxCNC's server may be (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--set-node",
-        type=whole_number(1, LARGEST_NODE_ID),
-        metavar="ID",
-        help="give the only device on a CAN bus this node id (LSS), after a question",
-    )
-    parser.add_file("--write", "write a cell file: what was found, and your answers to the rest")
-    parser.add_argument("--diagnose", metavar="NAME", help="watch a gauge, or encoders, of --cell")
-    parser.add_argument("--cell", type=Path, metavar="CELL", help="the cell file (TOML) of --diagnose")
-    parser.add_argument(
-        "--seconds",
-        type=bounded_seconds,
-        default=10.0,
-        metavar="S",
-        help="how long --diagnose watches (default: %(default)s)",
-    )
+    words = "give the only device on a CAN bus this node id (LSS), after a question"
+    add_value(parser, "--set-node", "ID", words, whole_number(1, LARGEST_NODE_ID))
+    add_file(parser, "--write", "write a cell file: what was found, and your answers to the rest")
+    add_value(parser, "--diagnose", "NAME", "watch a gauge, or encoders, of --cell")
+    add_value(parser, "--cell", "CELL", "the cell file (TOML) of --diagnose", Path)
+    add_value(parser, "--seconds", "S", "how long --diagnose watches", bounded_seconds, 10.0)
     parser.add_json()
 
 
 def _schedule(commands: Any) -> None:  # noqa: ANN401
-    parser = add_command(
-        commands,
-        "schedule",
-        "have a cell checked each day: systemd units or a crontab line",
-        "unattended.schedule",
-    )
+    summary = "have a cell checked each day: systemd units or a crontab line"
+    parser = add_command(commands, "schedule", summary, "unattended.schedule")
     parser.add_cell()
     what = parser.add_mutually_exclusive_group()
-    what.add_argument("--daily", metavar="HH:MM", help="write the units: a run each day at this time")
-    what.add_argument("--show", action="store_true", help="show the units of this cell")
-    what.add_argument("--remove", action="store_true", help="remove them")
+    add_value(what, "--daily", "HH:MM", "write the units: a run each day at this time")
+    add_flag(what, "--show", "show the units of this cell")
+    add_flag(what, "--remove", "remove them")
     parser.add_argument(
         "--mode",
-        choices=("check", "quick", "optimise"),
+        choices=MODES,
         default="check",
         help="check: change nothing (default); quick: correct what has drifted, optimise: recalibrate, "
         "and apply only within the limits",
     )
-    parser.add_argument("--on-failure", metavar="UNIT", help="unit that systemd starts after a failure")
-    parser.add_file("--metrics", "write metrics of the cell there after each run")
-    parser.add_argument("--cron", action="store_true", help="print a crontab line instead")
-    parser.add_argument("--folder", type=Path, metavar="FOLDER", help="where the units are, if elsewhere")
+    add_value(parser, "--on-failure", "UNIT", "unit that systemd starts after a failure")
+    add_file(parser, "--metrics", "write metrics of the cell there after each run")
+    add_flag(parser, "--cron", "print a crontab line instead")
+    add_value(parser, "--folder", "FOLDER", "where the units are, if elsewhere", Path)
     parser.add_json()
 
 
@@ -107,77 +71,66 @@ def _status(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(commands, "status", "all cells at a glance: verdicts, and what waits for a person")
     parser.add_argument("cells", type=Path, nargs="*", metavar="CELL", help="cell files (TOML)")
     parser.add_archive("instead of cell files: all cells that share this archive")
-    parser.add_file("--metrics", "write it as metrics for Prometheus' node exporter too")
+    add_file(parser, "--metrics", "write it as metrics for Prometheus' node exporter too")
     parser.add_json()
 
 
 def _notify(commands: Any) -> None:  # noqa: ANN401
-    parser = add_command(
-        commands, "notify", "who hears of unattended runs: list, try, send what waits", "unattended.notify"
-    )
+    summary = "who hears of unattended runs: list, try, send what waits"
+    parser = add_command(commands, "notify", summary, "unattended.notify")
     parser.add_cell()
     what = parser.add_mutually_exclusive_group()
-    what.add_argument("--test", action="store_true", help="notify everybody of a test now")
-    what.add_argument("--send", action="store_true", help="send what earlier runs could not")
+    add_flag(what, "--test", "notify everybody of a test now")
+    add_flag(what, "--send", "send what earlier runs could not")
     parser.add_json()
 
 
 def _serve(commands: Any) -> None:  # noqa: ANN401
-    parser = add_command(
-        commands, "serve", "serve the results of a cell by OPC UA until interrupted", "serve.results"
-    )
-    parser.add_cell()
+    summary = "serve the results of a cell by OPC UA until interrupted"
+    add_command(commands, "serve", summary, "serve.results").add_cell()
 
 
 def _cell(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(commands, "cell", "validate or show a cell file, or print its schema")
     actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True, dest="action")
-    validate = add_parser(actions, "validate", "check it; every mistake with its line")
-    validate.add_cell()
-    validate.add_json()
-    schema = add_parser(
-        actions, "schema", "print the JSON Schema of cell files, for editors and other programs"
-    )
-    schema.add_json()
-    show = add_parser(actions, "show", "print it with defaults filled in, and the origin of each value")
-    show.add_cell()
-    show.add_json()
+    for name, summary in (
+        ("validate", "check it; every mistake with its line"),
+        ("schema", "print the JSON Schema of cell files, for editors and other programs"),
+        ("show", "print it with defaults filled in, and the origin of each value"),
+    ):
+        action = add_parser(actions, name, summary)
+        if name != "schema":
+            action.add_cell()
+        action.add_json()
 
 
 def _completion(commands: Any) -> None:  # noqa: ANN401
-    parser = add_command(
-        commands, "completion", "print a script that lets a shell complete commands and files"
-    )
+    summary = "print a script that lets a shell complete commands and files"
+    parser = add_command(commands, "completion", summary)
     parser.add_argument("shell", choices=SHELLS, metavar="SHELL", help=f"one of {', '.join(SHELLS)}")
 
 
 def _apply(commands: Any) -> None:  # noqa: ANN401
-    parser = add_command(
-        commands, "apply", "write the proposal of a run into the controller's config", "config.apply_run"
-    )
+    summary = "write the proposal of a run into the controller's config"
+    parser = add_command(commands, "apply", summary, "config.apply_run")
     parser.add_run()
     _add_reason(parser)
     parser.add_json()
 
 
 def _rollback(commands: Any) -> None:  # noqa: ANN401
-    parser = add_command(
-        commands, "rollback", "undo what was written into the controller's config", "config.rollback_config"
-    )
+    summary = "undo what was written into the controller's config"
+    parser = add_command(commands, "rollback", summary, "config.rollback_config")
     parser.add_cell()
-    parser.add_argument(
-        "--to",
-        metavar="RUN",
-        help="restore what this run wrote, by its folder or name (default: undo the latest write)",
-    )
+    words = "restore what this run wrote, by its folder or name (default: undo the latest write)"
+    add_value(parser, "--to", "RUN", words)
     _add_reason(parser)
     parser.add_json()
 
 
 def _add_reason(parser: Parser) -> None:
-    parser.add_argument(
-        "--reason", default="", metavar="TEXT", help="why, for `history --changes`: one line of text"
-    )
+    words = "why, for `history --changes`: one line of text"
+    parser.add_argument("--reason", default="", metavar="TEXT", help=words)
 
 
 def _history(commands: Any) -> None:  # noqa: ANN401
@@ -187,30 +140,17 @@ def _history(commands: Any) -> None:  # noqa: ANN401
         "                        --keep DAYS [--delete] | --drift | --changes]\n"
         "                        [--archive URL] [--json] [CELL]"
     )  # argparse does not break a group
-    parser.add_argument(
-        "cell", type=Path, nargs="?", metavar="CELL", help="the cell file; without it all of --archive"
-    )
+    words = "the cell file; without it all of --archive"
+    parser.add_argument("cell", type=Path, nargs="?", metavar="CELL", help=words)
     what = parser.add_mutually_exclusive_group()
-    what.add_argument(
-        "--compare",
-        nargs=2,
-        metavar=("RUN", "RUN"),
-        help="what changed from one run to another, parameter by parameter",
-    )
-    what.add_argument("--show", metavar="RUN", help="what happened in a run, and when")
-    what.add_argument(
-        "--keep",
-        type=float,
-        metavar="DAYS",
-        help="which runs that ended before may be deleted; those that wrote the config never may",
-    )
-    what.add_argument("--drift", action="store_true", help="the trend of every parameter over all runs")
-    what.add_argument(
-        "--changes",
-        action="store_true",
-        help="every write into the controller's config: when, who, what and why",
-    )
-    parser.add_argument("--delete", action="store_true", help="with --keep: delete those")
+    words = "what changed from one run to another, parameter by parameter"
+    what.add_argument("--compare", nargs=2, metavar=("RUN", "RUN"), help=words)
+    add_value(what, "--show", "RUN", "what happened in a run, and when")
+    words = "which runs that ended before may be deleted; those that wrote the config never may"
+    add_value(what, "--keep", "DAYS", words, float)
+    add_flag(what, "--drift", "the trend of every parameter over all runs")
+    add_flag(what, "--changes", "every write into the controller's config: when, who, what and why")
+    add_flag(parser, "--delete", "with --keep: delete those")
     parser.add_archive(
         "the index over the runs: postgresql://user@host/database (default: as [archive] has it)"
     )
@@ -218,16 +158,14 @@ def _history(commands: Any) -> None:  # noqa: ANN401
 
 
 def _report(commands: Any) -> None:  # noqa: ANN401
-    parser = add_command(
-        commands, "report", "write the report of a run: one file to read, print and file", "recorded.report"
-    )
+    summary = "write the report of a run: one file to read, print and file"
+    parser = add_command(commands, "report", summary, "recorded.report")
     parser.add_run()
-    parser.add_file(
+    add_file(
+        parser,
         "--output",
         "where to (default: report.html in the run folder); .pdf gives PDF/A, .xml a Digital Calibration "
         "Certificate",
     )
-    parser.add_argument(
-        "--compare", type=Path, metavar="RUN", help="say also what has changed since this run, a folder"
-    )
+    add_value(parser, "--compare", "RUN", "say also what has changed since this run, a folder", Path)
     parser.add_json()

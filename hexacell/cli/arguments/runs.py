@@ -3,7 +3,16 @@
 from pathlib import Path
 from typing import Any
 
-from hexacell.cli.arguments.commands import add_command, add_parser, whole_number
+from hexacell.cli.arguments.commands import (
+    MODES,
+    Parser,
+    add_command,
+    add_file,
+    add_flag,
+    add_parser,
+    add_value,
+    whole_number,
+)
 
 
 def add_run_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
@@ -16,19 +25,10 @@ def _demo(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(
         commands, "demo", "do the whole job on a simulated cell, nothing attached", "run.demo"
     )
-    parser.add_argument(
-        "--config",
-        default="simulated-hexaglide",
-        metavar="NAME",
-        help="one of the cells that come with hexacell (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--folder",
-        type=Path,
-        default=Path("hexacell-demo"),
-        metavar="FOLDER",
-        help="where to work; an earlier demo there is replaced (default: %(default)s)",
-    )
+    words = "one of the cells that come with hexacell"
+    add_value(parser, "--config", "NAME", words, default="simulated-hexaglide")
+    words = "where to work; an earlier demo there is replaced"
+    add_value(parser, "--folder", "FOLDER", words, Path, Path("hexacell-demo"))
     parser.add_json()
 
 
@@ -36,27 +36,26 @@ def _run(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(commands, "run", "measure, identify, propose, write back and verify")
     parser.add_cell()
     parser.add_resume("run")
-    parser.add_argument("--unattended", action="store_true", help="no person can place gauges or approve")
+    add_flag(parser, "--unattended", "no person can place gauges or approve")
     parser.add_argument(
         "--mode",
-        choices=("check", "quick", "optimise"),
+        choices=MODES,
         help="check: measure until the error is decided, change nothing (default if unattended); "
         "quick: carry a check on to the accuracy of the last calibration, and write back; "
         "optimise: calibrate and write back (default otherwise)",
     )
-    parser.add_argument(
+    add_flag(
+        parser,
         "--length-check",
-        action="store_true",
-        help="check the length scale before the verdict, with the fixture of [length_check]; a resumed run "
+        "check the length scale before the verdict, with the fixture of [length_check]; a resumed run "
         "has it if it was begun with it",
     )
-    parser.add_file("--events", "write each event there, as a line of JSON, as it happens")
+    add_file(parser, "--events", "write each event there, as a line of JSON, as it happens")
     parser.add_json()
 
 
 def _tui(commands: Any) -> None:  # noqa: ANN401
-    parser = add_command(commands, "tui", "the technician's screen: measure, review, approve, roll back")
-    parser.add_cell()
+    add_command(commands, "tui", "the technician's screen: measure, review, approve, roll back").add_cell()
 
 
 def _length(commands: Any) -> None:  # noqa: ANN401
@@ -65,41 +64,27 @@ def _length(commands: Any) -> None:  # noqa: ANN401
     )
     parser.add_cell()
     parser.add_resume("check")
-    parser.add_argument("--unattended", action="store_true", help="no person can mount the gauges")
+    add_flag(parser, "--unattended", "no person can mount the gauges")
     parser.add_json()
 
 
 def _preflight(commands: Any) -> None:  # noqa: ANN401
-    parser = add_command(
-        commands, "preflight", "check everything that must hold before motion; moves nothing"
-    )
+    summary = "check everything that must hold before motion; moves nothing"
+    parser = add_command(commands, "preflight", summary)
     parser.add_cell()
-    parser.add_argument("--unattended", action="store_true", help="check also that no person is needed")
-    parser.add_argument(
-        "--mode",
-        choices=("quick", "optimise"),
-        default="optimise",
-        help="of the run: a calibration (default), or the quick level from the last result on",
-    )
+    add_flag(parser, "--unattended", "check also that no person is needed")
+    words = "of the run: a calibration (default), or the quick level from the last result on"
+    parser.add_argument("--mode", choices=MODES[1:], default="optimise", help=words)
     parser.add_json()
 
 
 def _simulate(commands: Any) -> None:  # noqa: ANN401
-    parser = add_command(
-        commands,
-        "simulate",
-        "serve a simulated cell to other processes until interrupted",
-        "serve.simulate",
-    )
+    summary = "serve a simulated cell to other processes until interrupted"
+    parser = add_command(commands, "simulate", summary, "serve.simulate")
     parser.add_cell()
-    parser.add_file("--output", "write the cell file for `run` there instead of to stdout")
-    parser.add_argument(
-        "--fault",
-        action="append",
-        default=[],
-        metavar="KIND:DEVICE@MOVE",
-        help='inject a fault, such as "damaged:x@12": of gauge x, with move 12; without @12 at once',
-    )
+    add_file(parser, "--output", "write the cell file for `run` there instead of to stdout")
+    words = 'inject a fault, such as "damaged:x@12": of gauge x, with move 12; without @12 at once'
+    parser.add_argument("--fault", action="append", default=[], metavar="KIND:DEVICE@MOVE", help=words)
 
 
 def _host(commands: Any) -> None:  # noqa: ANN401
@@ -108,62 +93,42 @@ def _host(commands: Any) -> None:  # noqa: ANN401
     parser.set_defaults(target="host.main")
     parser.add_cell()
     parser.add_argument("--folder", type=Path, required=True)
-    parser.add_argument("--mode", choices=("check", "quick", "optimise", "length"), required=True)
+    parser.add_argument("--mode", choices=(*MODES, "length"), required=True)
     parser.add_argument("--resume", action="store_true")
     parser.add_argument("--length-check", action="store_true")
 
 
 def _next(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(commands, "next", "print the pose worth measuring next", "records.propose_next")
-    parser.add_cell()
-    parser.add_file("--measurements", "the records so far (CSV)", is_required=True)
-    parser.add_argument(
-        "--refused",
-        type=whole_number(0),
-        default=0,
-        metavar="N",
-        help="how many poses at this point could not be measured; proposes another",
-    )
+    _add_measurements(parser, "the records so far (CSV)")
+    words = "how many poses at this point could not be measured; proposes another"
+    parser.add_argument("--refused", type=whole_number(0), default=0, metavar="N", help=words)
     parser.add_json()
 
 
 def _fit(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(commands, "fit", "identify the geometry from a measurement file", "records.fit")
-    parser.add_cell()
-    parser.add_file("--measurements", "the records (CSV)", is_required=True)
-    parser.add_argument(
-        "--identify",
-        choices=("all", "zeros"),
-        help="all parameters, or the encoders' zeros alone (default: as the cell file says)",
-    )
+    _add_measurements(parser, "the records (CSV)")
+    words = "all parameters, or the encoders' zeros alone (default: as the cell file says)"
+    parser.add_argument("--identify", choices=("all", "zeros"), help=words)
     parser.add_json()
 
 
+def _add_measurements(parser: Parser, what: str) -> None:
+    parser.add_cell()
+    parser.add_argument("--measurements", type=Path, required=True, metavar="FILE", help=what)
+
+
 def _replay(commands: Any) -> None:  # noqa: ANN401
-    parser = add_command(
-        commands,
-        "replay",
-        "repeat a recorded run's decisions and results, and compare",
-        "recorded.replay_run",
-    )
+    summary = "repeat a recorded run's decisions and results, and compare"
+    parser = add_command(commands, "replay", summary, "recorded.replay_run")
     parser.add_run("a run folder, or a journal")
-    parser.add_argument(
-        "--only",
-        choices=("decisions", "results", "identification"),
-        help="repeat only these, and take everything else as recorded",
-    )
-    parser.add_argument(
-        "--tolerance",
-        type=float,
-        metavar="T",
-        help="allowed difference of a number, relative above 1 (default: 1e-9)",
-    )
-    parser.add_argument(
-        "--export",
-        type=Path,
-        metavar="FOLDER",
-        help="replay nothing; copy the run folder there with every password masked, to be given to others",
-    )
+    words = "repeat only these, and take everything else as recorded"
+    parser.add_argument("--only", choices=("decisions", "results", "identification"), help=words)
+    words = "allowed difference of a number, relative above 1 (default: 1e-9)"
+    add_value(parser, "--tolerance", "T", words, float)
+    words = "replay nothing; copy the run folder there with every password masked, to be given to others"
+    add_value(parser, "--export", "FOLDER", words, Path)
     parser.add_json()
 
 
@@ -191,21 +156,12 @@ def add_study_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own 
 def _add_study(studies: Any, name: str, summary: str, drawn: str) -> None:  # noqa: ANN401
     parser = add_command(studies, name, summary, target="study.main")
     parser.set_defaults(study=name)
-    parser.add_argument(
-        "--draws", type=whole_number(1), default=20, metavar="N", help=f"{drawn} (default: %(default)s)"
-    )
+    add_value(parser, "--draws", "N", drawn, whole_number(1), 20)
     workers = parser.add_mutually_exclusive_group()
-    workers.add_argument(
-        "--processes", type=whole_number(1), metavar="N", help="at a time (default: one for each processor)"
-    )
-    workers.add_argument(
-        "--scheduler", metavar="ADDRESS", help="of a Dask cluster, tcp://HOST:PORT, instead of processes"
-    )
-    parser.add_argument(
-        "--folder",
-        type=Path,
-        default=Path("hexacell-study"),
-        help="keeps each result, so that a study can be interrupted, and gets a picture "
-        "(default: %(default)s)",
-    )
+    words = "at a time (default: one for each processor)"
+    add_value(workers, "--processes", "N", words, whole_number(1))
+    words = "of a Dask cluster, tcp://HOST:PORT, instead of processes"
+    add_value(workers, "--scheduler", "ADDRESS", words)
+    words = "keeps each result, so that a study can be interrupted, and gets a picture"
+    add_value(parser, "--folder", "FOLDER", words, Path, Path("hexacell-study"))
     parser.add_json()

@@ -121,7 +121,7 @@ def _run_and_repeat(request: RunRequest, console: Console, stream: EventStream |
     console.print(REPEATED)
     ended = execute_run(again, console, _copied(again, stream))
     state = fold(read_journal(again.folder.journal))
-    console.print(REPEATED_ALARM if unattended_runs.raised_alarm(state) else NOT_REPEATED_ALARM)
+    console.print(REPEATED_ALARM if state.alarm else NOT_REPEATED_ALARM)
     return RunEnd(again, ended, state)
 
 

@@ -1,4 +1,4 @@
-"""What a run was and found, read from its folder: its summary, result, judged accuracy and evidence."""
+"""What a run was and found, read from its folder: its summary, its result and its evidence."""
 
 from collections.abc import Container, Sequence
 from contextlib import suppress
@@ -18,7 +18,6 @@ from hexacell.services.history.journal_soundness import read_sound
 from hexacell.services.history.recorded_cell import started_robot
 from hexacell.services.history.run_index import EvidenceDocument, RunSummary
 from hexacell.services.write_back.proposals import later_approval
-from hexacell.verdict.decision import VerifiedAccuracy
 from procedures.calibration.calibration import Calibration, Mode
 from procedures.journal.journal import Entry, read_entries, read_journal
 from procedures.run.keys import Phase
@@ -55,8 +54,8 @@ def run_summary(folder: RunFolder) -> RunSummary:
         ended=entries[-1].at,
         mode="" if state.started is None else state.started.mode,
         records=sum(len(measured.samples) for measured in state.sets.values()),
-        verdict=None if state.judged is None else state.judged.verdict,
-        accuracy=judged_accuracy(state.judged),
+        verdict=state.verdict,
+        accuracy=state.accuracy,
         line=_last_line(entries, state),
         has_result=result_of_its_own(state) is not None,
         is_over=state.ended is not None,
@@ -99,15 +98,6 @@ def require_result(state: RunState, run: str) -> IdentificationResult:
             f"the run {run} identified no geometry of its own", action="Name calibrations, which do"
         )
     return result
-
-
-def judged_accuracy(judged: events.ResultValidated | None) -> VerifiedAccuracy | None:
-    """The errors at the task poses that a verdict is on; None without such a verdict."""
-    if judged is None:
-        return None
-    if judged.verification is not None:
-        return judged.verification.accuracy
-    return None if judged.check is None else judged.check.accuracy
 
 
 def _last_line(entries: Sequence[Entry], state: RunState) -> str:

@@ -14,7 +14,6 @@ from hexacell.results.result import AcceptedResult, LengthResult
 from hexacell.runs.run_folder import RunFolder, run_folders
 from hexacell.services.history.journal_soundness import read_sound
 from hexacell.services.history.recorded_cell import started_robot
-from hexacell.services.history.run_summary import judged_accuracy
 from hexacell.services.write_back.proposals import later_approval
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.length_check import with_measured_scale
@@ -101,10 +100,9 @@ def _result(cell: Cell, accepted: _AcceptedRun) -> AcceptedResult:
 
 def _length(state: RunState) -> LengthResult | None:
     """What the length check of a run found, or of the run that it started from."""
-    accuracy = judged_accuracy(state.judged)
-    before = None if state.started is None else state.started.accepted
-    found = None if accuracy is None else accuracy.length
-    return found or (None if before is None else before.length)
+    before = state.started and state.started.accepted
+    found = state.accuracy and state.accuracy.length
+    return found or (before.length if before else None)
 
 
 def _effects(cell: Cell, state: RunState) -> dict[str, tuple[tuple[float, ...], ...]]:

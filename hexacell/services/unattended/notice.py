@@ -13,9 +13,7 @@ from hexacell.cell.operation import Occasion
 from hexacell.errors import AnswerNeeded, DeviceError, ExitCode, HexacellError
 from hexacell.services.history.cell_status import next_calibration_due
 from hexacell.services.history.past_runs import past_runs
-from hexacell.services.history.run_summary import judged_accuracy
 from hexacell.services.run.calibration_run import RunRequest
-from hexacell.services.unattended.unattended_runs import raised_alarm
 from hexacell.verdict.decision import Verdict
 from procedures.run.state import RunState
 from procedures.steps import events
@@ -88,8 +86,8 @@ class RunEnd:
 
 def notice_of_end(end: RunEnd) -> Notice:
     """The notice of a run with a verdict, or with a question that nobody answered."""
-    cell, judged, name = end.request.cell, end.state.judged, end.request.folder.path.name
-    accuracy, alarm, occasions = judged_accuracy(judged), raised_alarm(end.state), _occasions(end)
+    cell, state, name = end.request.cell, end.state, end.request.folder.path.name
+    accuracy, alarm, occasions = state.accuracy, state.alarm, _occasions(end)
     return _notice(
         cell,
         occasions,
@@ -98,7 +96,7 @@ def notice_of_end(end: RunEnd) -> Notice:
         run=name,
         mode=end.request.mode.value,
         exit_code=end.ended.exit_code,
-        verdict=None if judged is None else judged.verdict,
+        verdict=state.verdict,
         position_mm=None if accuracy is None else accuracy.position.value,
         expanded_mm=None if accuracy is None else accuracy.position.expanded,
         limit_mm=None if accuracy is None else accuracy.position.limit,
@@ -152,12 +150,11 @@ def _notice(
 
 
 def _occasions(end: RunEnd) -> tuple[Occasion, ...]:
-    judged, code = end.state.judged, end.ended.exit_code
-    has_passed = judged is not None and judged.verdict is Verdict.PASS
+    verdict, code = end.state.verdict, end.ended.exit_code
     found = {
-        Occasion.PASS: has_passed and code == ExitCode.DONE,
-        Occasion.NO_PASS: judged is not None and not has_passed,
-        Occasion.ALARM: raised_alarm(end.state) is not None,
+        Occasion.PASS: verdict is Verdict.PASS and code == ExitCode.DONE,
+        Occasion.NO_PASS: verdict not in {None, Verdict.PASS},
+        Occasion.ALARM: end.state.alarm is not None,
         Occasion.ANSWER_NEEDED: code == ExitCode.ANSWER_NEEDED,
     }
     return tuple(one for one, is_so in found.items() if is_so) or (Occasion.FAILURE,)

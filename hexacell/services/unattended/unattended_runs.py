@@ -9,7 +9,6 @@ from pathlib import Path
 
 from hexacell.cell.model import CellSettings
 from hexacell.cell.operation import UnattendedSettings
-from hexacell.checks.change_alarm import ChangeAlarm
 from hexacell.errors import ExitCode, HexacellError, OutOfTime
 from hexacell.runs.run_folder import (
     RunFolder,
@@ -145,20 +144,12 @@ def _spans(settings: UnattendedSettings, at: datetime) -> Iterator[tuple[datetim
                 yield start, start + timedelta(minutes=length)
 
 
-def raised_alarm(state: RunState) -> ChangeAlarm | None:
-    """The alarm that a check raised, if any."""
-    check = None if state.judged is None else state.judged.check
-    alarm = None if check is None else check.alarm
-    return alarm if alarm is not None and alarm.is_raised else None
-
-
 def repetition(request: RunRequest, state: RunState) -> RunRequest | None:
     """The check to be made once more after one that nobody watched; None where there is no need.
 
     One that failed is not repeated: it has found what an alarm only suspects.
     """
     is_check = request.unattended and request.mode is Mode.CHECK
-    if not is_check or raised_alarm(state) is None:
+    if not is_check or state.alarm is None or state.verdict is Verdict.FAIL:
         return None
-    has_failed = state.judged is not None and state.judged.verdict is Verdict.FAIL
-    return None if has_failed else replace(request, folder=new_run(request.cell), resume=False)
+    return replace(request, folder=new_run(request.cell), resume=False)

@@ -127,8 +127,8 @@ def _read(run: RunFolder, receipt: Receipt) -> _Run:
         state = apply(state, entry.event)
     if (approval := later_approval(run)) is not None:
         noted.append(_record(WriteKind.APPLIED, approval.at, approval.by, run, receipt))
-    judged = state.judged
-    return _Run(run.name, tuple(noted), judged.verdict if judged else None, judged.line if judged else "")
+    line = state.judged.line if state.judged else ""
+    return _Run(run.name, tuple(noted), state.verdict, line)
 
 
 def _noted_in(entry: Entry, state: RunState, run: RunFolder, receipt: Receipt) -> Iterator[WriteRecord]:

@@ -26,7 +26,7 @@ def report_of(run: ReportedRun, earlier: ReportedRun | None = None) -> Report:
     Raises:
         UsageError: the two cannot be compared.
     """
-    verdict = statement.verdict_of(run)
+    verdict = run.state.verdict
     chapters = (
         statement.statement_chapter(run),
         statement.found_and_left_chapter(run),

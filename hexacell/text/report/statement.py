@@ -7,7 +7,6 @@ from collections.abc import Iterator
 
 from hexacell.lengths import unit_of
 from hexacell.services.history.reported_run import ReportedRun
-from hexacell.services.history.run_summary import judged_accuracy
 from hexacell.text.report.pages import Block, Chapter, Facts, Paragraph, Table, Tone
 from hexacell.text.verdict import VERDICT_MEANINGS, not_checked, scale_lines, teaching_sentence
 from hexacell.uncertainty.statement import COVERAGE_FACTOR
@@ -36,14 +35,9 @@ MODELS = {
 """What distinguishes the method of each kind of work."""
 
 
-def verdict_of(run: ReportedRun) -> Verdict | None:
-    """The verdict; None where the run ended before there was one."""
-    return None if run.state.judged is None else run.state.judged.verdict
-
-
 def statement_chapter(run: ReportedRun) -> Chapter:
     """The verdict, the errors that it is on, its reasons, scope and rule."""
-    judged, verdict, accuracy = run.state.judged, verdict_of(run), judged_accuracy(run.state.judged)
+    judged, verdict, accuracy = run.state.judged, run.state.verdict, run.state.accuracy
     meaning = "The run ended before anything could be said of the robot."
     if verdict is not None:
         is_of_length = judged is not None and judged.length is not None
@@ -158,7 +152,7 @@ def _found_and_left_rows(run: ReportedRun) -> Iterator[tuple[str, str, str]]:
         poses = len(run.state.held_out(Phase.AFTER))
         name = f"mean deviation of the ball at {poses} held-out poses"
         yield _before_after(name, verified.before_mm, verified.after_mm)
-    identified, accuracy = run.state.identified, judged_accuracy(run.state.judged)
+    identified, accuracy = run.state.identified, run.state.accuracy
     if identified is not None and identified.improvement is not None:
         after = None if accuracy is None else accuracy.position.value
         yield _before_after(

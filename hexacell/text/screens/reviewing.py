@@ -39,8 +39,8 @@ def review_texts(
     state, subject = picture.state, picture.question and picture.question.subject
     change = pending_text(subject) if isinstance(subject, PendingChange) else ""
     verdict = "No verdict yet: it is given once the held-out poses are measured."
-    if state.judged is not None:
-        verdict = f"{state.judged.verdict.upper()}: {VERDICT_MEANINGS[state.judged.verdict]}"
+    if state.verdict is not None:
+        verdict = f"{state.verdict.upper()}: {VERDICT_MEANINGS[state.verdict]}"
     header, *parameters = parameter_table(rows_of_run(state, settings))
     return {
         "verdict": verdict,
@@ -55,9 +55,7 @@ def review_texts(
 
 def verdict_urgency(state: RunState) -> Urgency:
     """How much attention the verdict needs."""
-    if state.judged is None:
-        return Urgency.CALM
-    return URGENCIES.get(state.judged.verdict, Urgency.ATTENTION)
+    return Urgency.CALM if state.verdict is None else URGENCIES.get(state.verdict, Urgency.ATTENTION)
 
 
 def review_plots(picture: RunPicture) -> tuple[PlotView, ...]:

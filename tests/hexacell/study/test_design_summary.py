@@ -13,7 +13,7 @@ from hexacell.study.design_study import (
     design_summary,
     design_trials_of,
 )
-from hexacell.text.studies import design_document, design_lines
+from hexacell.text.studies import STUDIES, design_lines
 
 
 def outcome(trial: DesignTrial) -> DesignOutcome:
@@ -57,4 +57,4 @@ def test_robots_that_are_not_identified_are_counted() -> None:
     assert isnan(found.noise_ratio["paper"])
     text = "\n".join(design_lines(found))
     assert "none of 2 robots" in text
-    assert json.dumps(design_document(found), allow_nan=False)
+    assert json.dumps(STUDIES["design"].document(found), allow_nan=False)

@@ -81,7 +81,8 @@ def _without_faults(problem: Problem) -> tuple[Selection, tuple[TermFinding, ...
         UncorrectableFaultError: neither with terms nor without can the records be used.
     """
     if problem.terms is not None:  # known before: linearized once more where the robot is
-        return select_faults(with_terms_of(problem, fit_regularized(problem))), ()
+        known = (TermFinding(term.name, Finding.KNOWN, 0.0) for term in problem.terms.terms)
+        return select_faults(with_terms_of(problem, fit_regularized(problem))), tuple(known)
     unknowns = len(problem.prior.covariance) + LEGS * len(problem.offered) + LEAST_SPARE_EQUATIONS
     if not problem.offered or problem.equations < unknowns:
         return select_faults(problem), ()

@@ -12,13 +12,20 @@ import numpy as np
 
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
-from hexacell.identification.diagnostics.pose_accuracy import error_jacobian, teachable_frames
+from hexacell.identification.diagnostics.pose_accuracy import (
+    error_jacobian,
+    errors_by_terms,
+    placement_of,
+    teachable_frames,
+)
 from hexacell.identification.problem.prior import Prior
+from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.corrections import NO_CORRECTIONS
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.model import Robot
-from hexacell.uncertainty.propagation import errors_by_term, placement_of
+from hexacell.uncertainty.statement import TaskErrors
 
 WANTED_MM = 0.02
 """How near the poses are to be, beside how far parameters go from what was identified."""
@@ -42,10 +49,9 @@ def absorbing(
     if not terms or not len(task.poses) or not len(task.workspace):
         return identified
     poses, frames = PoseBatch.joined([task.poses, task.workspace]), teachable_frames(belief, task.workspace)
-    errors = np.zeros((len(poses), 6))
     at_task, over = placement_of(belief, poses), placement_of(belief, task.workspace)
-    for term in terms:
-        errors = errors + errors_by_term(term, frames, at_task, over) @ left[term.name]
+    coefficients = np.concatenate([left[term.name] for term in terms])
+    errors = errors_by_terms(terms, frames, at_task, over) @ coefficients
     radius = float(robot.mechanism.platform_radius(identified))
     weights = np.repeat([1.0, radius], 3) / WANTED_MM
     rows = (weights[:, None] * error_jacobian(belief, poses, task.workspace)).reshape(-1, len(belief.free))
@@ -53,3 +59,21 @@ def absorbing(
     # A controller with parameters larger by dp brings the robot -J dp beside where it would be.
     change = np.linalg.solve(normal, rows.T @ (weights * errors).reshape(-1))
     return convention.geometry(belief.free + change)
+
+
+def errors_of_geometry_alone(
+    settings: CellSettings, robot: Robot, found: Identification
+) -> TaskErrors | None:
+    """The errors at the task poses with the best geometry, if the controller corrected nothing else.
+
+    None where it does not, or the robot can reach no task pose.
+    """
+    if found.terms is None or robot.corrections.are_none:
+        return None
+    coefficients = {term.name: found.terms.of(term.name)[0] for term in found.terms.terms}
+    geometry = absorbing(settings, robot, found.geometry, coefficients)
+    belief = replace(robot.belief(found), corrections=NO_CORRECTIONS)
+    budget = Task.of(settings, robot, belief).budget(found, belief, robot.effects, robot.known_effects)
+    if budget is None:
+        return None
+    return budget.errors_of(robot.mechanism.convention.free_parameters(geometry) - found.free)

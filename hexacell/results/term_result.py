@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -49,6 +50,26 @@ class TermResult(Frozen):
     def is_taken(self) -> bool:
         """Whether the identification has it."""
         return self.values is not None
+
+
+@dataclass(frozen=True, slots=True)
+class FoundTerms:
+    """What was found beside the geometry, and what a controller corrects."""
+
+    terms: tuple[TermResult, ...] = ()
+    corrections: Corrections = NO_CORRECTIONS
+
+    @property
+    def taken(self) -> tuple[TermResult, ...]:
+        """The terms that the identification has."""
+        return tuple(term for term in self.terms if term.is_taken)
+
+    def is_corrected(self, term: TermResult) -> bool:
+        """Whether the controller corrects a term."""
+        return any(self.corrections.of(term.name))
+
+
+NOTHING_FOUND = FoundTerms()
 
 
 def term_results(found: Identification) -> tuple[TermResult, ...]:

@@ -15,6 +15,7 @@ from hexacell.lengths import unit_of
 from hexacell.text.layout import COLUMNS, duration, wrapped
 from hexacell.text.measured_noise import measured_noise_text, reversal_sentence
 from hexacell.text.planning import quick_accuracy_text, run_forecast_line
+from hexacell.text.terms import run_terms_text
 from hexacell.text.verdict import check_text, length_text, start_text, verification_text
 from procedures.journal.journal import Entry
 from procedures.run.keys import Phase, SetKey
@@ -133,7 +134,8 @@ def event_text(event: events.Event, state: RunState) -> str | None:
             )
         case events.ResultValidated():
             if event.verification is not None:
-                return verification_text(event.verification)
+                found = wrapped(f"  {run_terms_text(state)}".rstrip(), indent=2)
+                return "\n".join(filter(None, [verification_text(event.verification), found]))
             check = None if event.check is None else check_text(event.check)
             return check if event.length is None else length_text(event.length)
     text = event.text(state)

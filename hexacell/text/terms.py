@@ -1,10 +1,18 @@
 """Text for what an identification found beside the geometry."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from hexacell.identification.terms.finding import Finding
-from hexacell.results.term_result import TermResult
+from hexacell.kinematics.corrections import NONE, CorrectionKind, Six
+from hexacell.results.term_result import FoundTerms, TermResult
 from hexacell.text.layout import wrapped
+from hexacell.text.verdict import improvement_sentence
+
+if TYPE_CHECKING:
+    from procedures.run.state import RunState
 
 
 def terms_text(results: Sequence[TermResult]) -> str:
@@ -16,10 +24,50 @@ def terms_text(results: Sequence[TermResult]) -> str:
     return "\n".join([wrapped(f"Not geometry: {sentences}"), *_table(taken)])
 
 
+def run_terms_text(state: RunState) -> str:
+    """What a run found beside the geometry, what corrects it, and what that gained; empty for nothing."""
+    found = found_sentence(state.found_terms)
+    if not found or state.identified is None:
+        return ""
+    verified = None if state.judged is None else state.judged.verification
+    accuracy = None if verified is None else verified.accuracy
+    gain = improvement_sentence(state.identified.improvement, accuracy)
+    return f"{found} {gain}".strip()
+
+
+def found_sentence(found: FoundTerms) -> str:
+    """The terms with their sizes, and what corrects each; empty for none."""
+    said = [f"{_size(term)}, {_fate(term, found)}" for term in found.taken]
+    said += [_sentence(term).rstrip(".") for term in found.terms if term.finding is Finding.NOT_DISTINCT]
+    return f"Not geometry: {'; '.join(said)}." if said else ""
+
+
+def _size(term: TermResult) -> str:
+    """A term with its smallest and largest coefficient."""
+    values, sigma = _smallest_to_largest(term.values), _smallest_to_largest(term.sigma)
+    return f"{term.name} of {values} {term.unit} (one sigma {sigma})"
+
+
+def _smallest_to_largest(numbers: Six | None) -> str:
+    smallest, largest = f"{min(numbers or NONE):.3f}", f"{max(numbers or NONE):.3f}"
+    return smallest if smallest == largest else f"{smallest} to {largest}"
+
+
+def _fate(term: TermResult, found: FoundTerms) -> str:
+    """What becomes of a term."""
+    if found.is_corrected(term):
+        return "corrected by the controller"
+    if term.name == CorrectionKind.BACKLASH:
+        return "not corrected: scatter at work"
+    return "not corrected: the geometry does as much of it as it can"
+
+
 def _sentence(result: TermResult) -> str:
     match result.finding:
         case Finding.TAKEN:
             return f"{result.name} is shown (evidence e^{result.log_factor:.0f}) and taken."
+        case Finding.KNOWN:
+            return f"{result.name} is {result.finding}."
         case Finding.NOT_DISTINCT:
             return f"{result.name} cannot be told apart from {result.rival}; nothing is corrected of it."
         case Finding.NOT_PREDICTED | Finding.FAULTS:

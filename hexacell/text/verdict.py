@@ -162,14 +162,26 @@ def gate_lines(gates: Sequence[AcceptanceGate]) -> str:
     return "\n".join(f"{'ok' if gate.passed else 'NO'}  {gate.sentence}" for gate in gates)
 
 
-def improvement_sentence(expected: ExpectedImprovement | None) -> str:
-    """What a change of the controller's config improves; empty if that is not known."""
+def improvement_sentence(
+    expected: ExpectedImprovement | None, verified: VerifiedAccuracy | None = None
+) -> str:
+    """What a change of the controller's config improves, or improved; empty if that is not known.
+
+    ``verified`` is the accuracy that was judged afterwards.
+    """
     if expected is None:
         return ""
-    return (
-        f"Largest position error at the task poses: {expected.now_mm:.3g} mm with the current config, "
-        f"0 +- {expected.expanded_mm:.2g} mm with this one."
-    )
+    before, after = "the current config", f"0 +- {expected.expanded_mm:.2g} mm with this one"
+    if verified is not None:
+        before, after = "the config before", f"{_with_u(verified.position)} with the new config"
+        if verified.alone is not None:
+            after = f"{_with_u(verified.alone)} with the best geometry alone, {after}"
+    return f"Largest position error at the task poses: {expected.now_mm:.3g} mm with {before}, {after}."
+
+
+def _with_u(error: JudgedError) -> str:
+    shown = error.shown_in("mm")
+    return f"{shown.number(error.value)} +- {shown.length(error.expanded)}"
 
 
 def teaching_sentence(moved: TaskDisplacement | None) -> str:

@@ -22,7 +22,12 @@ import numpy as np
 
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.frame_alignment import FrameFit
-from hexacell.identification.diagnostics.pose_accuracy import error_jacobian, teachable_frames
+from hexacell.identification.diagnostics.pose_accuracy import (
+    error_jacobian,
+    errors_by_terms,
+    placement_of,
+    teachable_frames,
+)
 from hexacell.identification.identified_zeros import IdentifiedZeros
 from hexacell.identification.placement import Placement
 from hexacell.identification.solver.measurement_model import NuisanceElimination
@@ -155,16 +160,8 @@ class Propagation:
         return float(np.sum(by_causes**2) - np.sum(absorbed * (self.found.free_covariance @ absorbed)))
 
     def by_terms(self, terms: TermEstimates) -> Array:
-        """Errors (t, 6, 6 m) at the task poses by one unit of each coefficient of m terms.
-
-        Those of a term that acts by the direction of arrival, which is another at each stop, are zero.
-        """
-        return np.concatenate([self._by_term(term) for term in terms.terms], axis=-1)
-
-    def uncorrected(self, terms: TermEstimates) -> Array:
-        """What of the coefficients (6 m,) the controller does not correct."""
-        corrected = np.concatenate([self.corrections.of(term.name) for term in terms.terms])
-        return np.asarray(terms.values - corrected)
+        """Errors (t, 6, 6 m) at the task poses by one unit of each coefficient of m terms."""
+        return errors_by_terms(terms.terms, self.frames, self.task, self.workspace)
 
     def reversals(self, terms: TermEstimates | None) -> Iterator[Effect]:
         """What nobody knows the side of at work: another error at every stop.
@@ -174,18 +171,13 @@ class Propagation:
         """
         if terms is None:
             return
-        left = self.uncorrected(terms)
+        left = terms.left_by(self.corrections)
         for row, term in enumerate(terms.terms):
             if term.on_either_side is not None:
                 rows = slice(row * LEGS, (row + 1) * LEGS)
                 sigma = np.sqrt(np.diag(terms.covariance)[rows])
                 sizes = left[rows] if term.needs_directions else terms.values[rows]
                 yield _at_every_stop(term, term.on_either_side, np.hypot(sizes, sigma))
-
-    def _by_term(self, term: ModelTerm) -> Array:
-        if term.needs_directions:
-            return np.zeros((len(self.task), 6, LEGS))
-        return errors_by_term(term, self.frames, self.task, self.workspace)
 
     def _direct(self, effect: Effect) -> Array:
         """Errors (t, 6, k) by the effect itself; frames cannot be fitted to what differs at every stop."""
@@ -195,12 +187,6 @@ class Propagation:
         if effect.occurrence in {Occurrence.EVERY_STOP, Occurrence.STOPS_AT_WORK}:
             return each_alone(errors)
         return self.frames.remove_frame_motion(self.task.poses, errors, effect.on_poses(self.workspace))
-
-
-def errors_by_term(term: ModelTerm, frames: FrameFit, task: Placement, workspace: Placement) -> Array:
-    """Errors (t, 6, 6) at task poses by one unit of each coefficient of a term, with frames fitted."""
-    at_task, over = (term.pose_errors(at, np.zeros_like(at.joints)) for at in (task, workspace))
-    return frames.remove_frame_motion(task.poses, at_task, over)
 
 
 def _at_every_stop(term: ModelTerm, on_either_side: LegErrors, sizes: Array) -> Effect:
@@ -213,12 +199,6 @@ def _at_every_stop(term: ModelTerm, on_either_side: LegErrors, sizes: Array) -> 
         return np.asarray(at.by_constraints * errors[:, None, :])
 
     return Effect(f"{term.name} on either side", size, unit, at_work, columns, source="identified")
-
-
-def placement_of(belief: RobotBelief, poses: PoseBatch) -> Placement:
-    """The estimated robot at poses that it reaches."""
-    joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
-    return Placement(belief.mechanism, belief.estimate, poses, joints)
 
 
 def each_alone(errors: Array) -> Array:

@@ -20,6 +20,7 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.noise.measured_noise import MeasuredNoise
 from hexacell.noise.record_noise import NoiseLevels, Repeatability, noise_levels, repeatability
 from hexacell.results.result import ExpectedImprovement
+from hexacell.results.term_result import corrections_for, term_results
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.possible_causes import PossibleCause, possible_causes
@@ -129,6 +130,7 @@ def assess(
     separating = decorrelating_poses(robot.belief(found), found, pairs[:SEPARATED_PAIRS])
     commands = [pose and replace(pose, command=robot.to_command(pose.command)) for pose in separating]
     record_noise = found.problem.noise.record_covariance(found.prediction.by_joints)
+    corrections, _ = corrections_for(term_results(found), settings, robot.holds, robot.corrections)
     # Residuals that are too large, and small enough to be explained to first order.
     is_doubtful = goodness.agreement is ChiSquareVerdict.TOO_LARGE and goodness.ratio <= CONTRADICTED_RATIO
     return Assessment(
@@ -141,7 +143,13 @@ def assess(
         task=tuple(robot.to_command(task.poses.pose(row)) for row in range(len(task.poses))),
         task_named=bool(settings.task.poses),
         accuracy=accuracy and replace(accuracy, after=accuracy.after.times(goodness.noise_factor)),
-        budget=task.budget(found, belief, robot.effects, robot.known_effects, zeros=zeros),
+        budget=task.budget(
+            found,
+            belief if corrections is None else replace(belief, corrections=corrections),
+            robot.effects,
+            robot.known_effects,
+            zeros=zeros,
+        ),
         tolerance_violations=robot.tolerance_violations(found.estimate),
         possible_causes=possible_causes(found) if found.converged and is_doubtful else (),
         measured_noise=measured_noise,

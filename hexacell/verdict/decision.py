@@ -160,6 +160,8 @@ class VerifiedAccuracy(Frozen):
     Attributes:
         of_geometry: the errors without the scatter of the stops; None where the machine repeats as well as
             was stated, or measured.
+        alone: the position error that the best geometry would leave if the controller corrected nothing
+            else; None where it does not.
         poses: their number, and whether the cell file names them; else they span the workspace.
         worst: the pose with the largest position error, in the controller's frames.
         scale_of: what says how long a millimetre is: the encoders, or the drawing where these read angles.
@@ -172,6 +174,7 @@ class VerifiedAccuracy(Frozen):
     task_named: bool
     worst: SixNumbers
     of_geometry: GeometryErrors | None = None
+    alone: JudgedError | None = None
     length: LengthResult | None = None
     scale_of: Literal["encoders", "drawing"] = "encoders"
     direction: Literal[-1, 0, 1] = 0
@@ -186,6 +189,7 @@ class VerifiedAccuracy(Frozen):
         *,
         task_named: bool,
         of_geometry: TaskErrors | None = None,
+        alone: TaskErrors | None = None,
         length: LengthResult | None = None,
         direction: Literal[-1, 0, 1] = 0,
     ) -> VerifiedAccuracy:
@@ -197,6 +201,7 @@ class VerifiedAccuracy(Frozen):
             poses=len(task.poses),
             task_named=task_named,
             of_geometry=None if of_geometry is None else GeometryErrors.of(of_geometry, limits),
+            alone=None if alone is None else GeometryErrors.of(alone, limits).position,
             worst=robot.to_command(task.poses.pose(errors.worst)).as_tuple(),
             length=length,
             scale_of="encoders" if joint_unit is JointUnit.MM else "drawing",

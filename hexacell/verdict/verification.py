@@ -25,6 +25,7 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
+from hexacell.results.absorbed_terms import errors_of_geometry_alone
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.length_records import JudgedGeometry
 from hexacell.verdict.decision import ErrorLimits, Verdict, VerifiedAccuracy, worst_verdict
@@ -206,6 +207,7 @@ def verified_accuracy(
         task,
         task_named=is_named,
         of_geometry=of_geometry,
+        alone=errors_of_geometry_alone(settings, robot, updated),
         length=length,
         direction=settings.motion.sign,
     )

@@ -9,6 +9,7 @@ from hexacell.cell.recovery import Action
 from hexacell.kinematics.corrections import CorrectionChange
 from hexacell.kinematics.pose import Pose
 from hexacell.results.result import ExpectedImprovement
+from hexacell.results.term_result import NOTHING_FOUND, FoundTerms
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.verification import Verification
@@ -39,7 +40,7 @@ class GaugePlacement:
 class PendingChange:
     """A change of the controller's config: its acceptance gates, and the text change as a diff.
 
-    ``corrections`` are the numbers beside the geometry that it changes.
+    ``corrections`` are the numbers beside the geometry that it changes, ``found`` what they are for.
     ``displacement`` is how far it moves taught points, ``improvement`` what it is for; None if that is not
     known.
     """
@@ -49,6 +50,7 @@ class PendingChange:
     displacement: TaskDisplacement | None = None
     improvement: ExpectedImprovement | None = None
     corrections: tuple[CorrectionChange, ...] = ()
+    found: FoundTerms = NOTHING_FOUND
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,10 +121,11 @@ def ask_approval(
     *,
     cell: str,
     corrections: tuple[CorrectionChange, ...] = (),
+    found: FoundTerms = NOTHING_FOUND,
 ) -> Question:
     """Ask whether the config of a cell may be written; answered by the name of who approves."""
     is_grave = any(gate.needs_cell_name and not gate.passed for gate in gates)
-    change = PendingChange(tuple(gates), diff, displacement, improvement, corrections)
+    change = PendingChange(tuple(gates), diff, displacement, improvement, corrections, found)
     return Question(change, consent=cell if is_grave else "yes")
 
 

@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, TypeVar
 
 from hexacell.cell.recovery import FailureKind
 from hexacell.kinematics.commanded_motion import RefusedCommand, RefusedCommands
+from hexacell.kinematics.corrections import NO_CORRECTIONS
 from hexacell.measurements.records import Directions, MeasurementSet, Record
+from hexacell.results.term_result import FoundTerms
 from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
 from procedures.run.readings import Reading
 
@@ -180,6 +182,13 @@ class RunState:
     def is_unverified(self) -> bool:
         """Whether the controller has a new geometry on which no verdict was given."""
         return self.committed is not None and self.judged is None
+
+    @property
+    def found_terms(self) -> FoundTerms:
+        """What was identified beside the geometry, and what the proposed config corrects."""
+        terms = () if self.identified is None else self.identified.result.terms
+        corrections = None if self.proposed is None else self.proposed.corrections
+        return FoundTerms(terms, corrections or NO_CORRECTIONS)
 
     @property
     def open_sets(self) -> list[SetKey]:

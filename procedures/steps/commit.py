@@ -63,6 +63,7 @@ class Commit(StepWithoutMotion):
                 improvement,
                 cell=run.settings.name,
                 corrections=change.changed_corrections,
+                found=state.found_terms,
             )
         )
         if name is None:

@@ -219,6 +219,23 @@ def test_a_folder_that_is_no_demo_is_not_changed(typed_here, tmp_path):
 
 
 @pytest.mark.slow
+def test_a_worn_machine_is_told_what_was_found_what_is_corrected_and_what_that_gained(typed_here) -> None:
+    outcome = typed_here("demo", "--config", "worn-hexaglide", "--json")
+    assert outcome.code == 0, outcome.err
+    found = (
+        r"Not geometry: backlash of .*, corrected by the controller; play of .*, corrected by the "
+        r"controller\. Largest position error at the task poses: .* mm with the config before, "
+        r"(.*) \+- .* mm with the best geometry alone, (.*) \+- .* mm with the new config\."
+    )
+    said = re.search(found, " ".join(outcome.err.split()))
+    assert said, outcome.err
+    assert float(said[1]) > 2.0 * float(said[2])
+    assert typed_here("report", outcome.document["run"]).code == 0
+    page = (Path(outcome.document["run"]) / "report.html").read_text()
+    assert "<h2>What is not geometry</h2>" in page
+
+
+@pytest.mark.slow
 def test_the_papers_experiment_passes_too(typed):
     outcome = typed("demo", "--config", "paper-experiment", "--json")
     assert outcome.code == 0, outcome.err

@@ -53,7 +53,7 @@ def test_paper_experiment_is_tables_3_and_4():
 
 PUBLISHED = ["camera-hexapod", "wpi-hexapod"]
 OTHERS = ["gough-stewart", "linapod", "rotary-cranks", "linuxcnc-hexapod/cell", *PUBLISHED]
-NAMES = [*OTHERS, "simulated-hexaglide", "paper-experiment"]
+NAMES = [*OTHERS, "simulated-hexaglide", "worn-hexaglide", "paper-experiment"]
 NOT_THEIRS = re.compile(r"\b(slider|rail|hexaglide)", re.IGNORECASE)
 
 

@@ -28,6 +28,7 @@ from procedures.run.questions import ask_approval, ask_placement
 from procedures.run.trips import Guard
 from procedures.steps import events
 from tests.screen.conftest import SNAPSHOTS, UPDATE, compare_with_snapshot, settled
+from tests.screen.test_found_terms import told
 from tests.screen.test_job import until_shown
 from tests.screen.test_plan_screen import tried
 from tests.screen.told_run import ToldRun, ToldWorkplace, past_run, snapshot
@@ -121,7 +122,7 @@ def scene_measure(cell: Cell, history: History) -> Opening:
 
 
 def scene_review(cell: Cell, history: History) -> Opening:
-    run, workplace = running(cell, history, len(history))
+    run, workplace = running(cell, told(history), len(history))
     run.tell(StatusChanged(status=Status.ENDED))
     return workplace, ("4",)
 

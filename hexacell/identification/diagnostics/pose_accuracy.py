@@ -1,18 +1,23 @@
 """Predicted pose accuracy: the error of commanded poses before and after calibration.
 
 Before: the controller has its present geometry and the machine the estimate; their difference is computed
-by continuation. After: the controller has the estimate, from which the machine differs by a random error
-of the covariance C. To first order the pose error is ``H dx`` with H the implicit derivative of the pose
-by the parameters, so its covariance is ``H C H^T``. In both, base and platform frames are fitted over the
-workspace, so that teaching cannot remove what is left. The repeatability of the machine is not included.
+by continuation, and what is not geometry and not corrected is added. After: the controller has the
+estimate, from which the machine differs by a random error of the covariance C. To first order the pose
+error is ``H dx`` with H the implicit derivative of the pose by the parameters, so its covariance is
+``H C H^T``. In both, base and platform frames are fitted over the workspace, so that teaching cannot remove
+what is left. The repeatability of the machine is not included.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.frame_alignment import FrameFit, PoseErrors, pose_errors
+from hexacell.identification.placement import Placement
+from hexacell.identification.terms.term import ModelTerm
+from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import free_sensitivity
@@ -60,16 +65,21 @@ def predicted_accuracy(belief: RobotBelief, *, task: PoseBatch, workspace: PoseB
     if not task_reachable.any() or not workspace_reachable.any():
         return None
     task, workspace = task[task_reachable], workspace[workspace_reachable]
-    aligned = teachable_frames(belief, workspace).aligned(
-        reached_workspace[workspace_reachable], reached[task_reachable]
-    )
+    frames = teachable_frames(belief, workspace)
+    aligned = frames.aligned(reached_workspace[workspace_reachable], reached[task_reachable])
+    before = pose_errors(aligned, task)
+    if (terms := belief.terms) is not None:
+        by_terms = errors_by_terms(
+            terms.terms, frames, placement_of(belief, task), placement_of(belief, workspace)
+        )
+        before = before + by_terms @ terms.left_by(belief.corrections)
     jacobian = error_jacobian(belief, task, workspace)
     # The trace of a covariance is the mean square length.
     mean_squares = np.einsum("nap,pq,naq->na", jacobian, belief.covariance, jacobian)
     return Accuracy(
         poses=task,
         reachable=task_reachable,
-        before=PoseErrors.of_squares(pose_errors(aligned, task) ** 2),
+        before=PoseErrors.of_squares(before**2),
         after=PoseErrors.of_squares(mean_squares),
     )
 
@@ -90,6 +100,27 @@ def error_jacobian(belief: RobotBelief, task: PoseBatch, workspace: PoseBatch) -
     both = free_sensitivity(belief.mechanism, belief.estimate, poses, joints).free
     of_task, of_workspace = both[: len(task)], both[len(task) :]
     return teachable_frames(belief, workspace).remove_frame_motion(task, of_task, of_workspace)
+
+
+def errors_by_terms(
+    terms: Sequence[ModelTerm], frames: FrameFit, task: Placement, workspace: Placement
+) -> Array:
+    """Errors (t, 6, 6 m) at task poses by one unit of each coefficient of m terms, with frames fitted.
+
+    Those of a term that acts by the direction of arrival, which is another at each stop, are zero.
+    """
+    found = np.zeros((len(task), 6, len(terms), LEGS))
+    for row, term in enumerate(terms):
+        if not term.needs_directions:
+            at_task, over = (term.pose_errors(at, np.zeros_like(at.joints)) for at in (task, workspace))
+            found[:, :, row] = frames.remove_frame_motion(task.poses, at_task, over)
+    return found.reshape(len(task), 6, -1)
+
+
+def placement_of(belief: RobotBelief, poses: PoseBatch) -> Placement:
+    """The estimated robot at poses that it reaches."""
+    joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
+    return Placement(belief.mechanism, belief.estimate, poses, joints)
 
 
 def teachable_frames(belief: RobotBelief, workspace: PoseBatch) -> FrameFit:

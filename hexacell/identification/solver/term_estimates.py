@@ -10,6 +10,7 @@ from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.measurement_model import NuisanceElimination, Prediction
 from hexacell.identification.terms.taken import TakenTerms, spread_of
 from hexacell.identification.terms.term import ModelTerm
+from hexacell.kinematics.corrections import Corrections
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
 
@@ -70,6 +71,11 @@ class TermEstimates:
         row = [term.name for term in self.terms].index(name) * LEGS
         rows = slice(row, row + LEGS)
         return self.values[rows], np.sqrt(np.diag(self.covariance)[rows])
+
+    def left_by(self, corrections: Corrections) -> Array:
+        """What of the coefficients (6 m,) a controller with some corrections does not correct."""
+        corrected = np.concatenate([corrections.of(term.name) for term in self.terms])
+        return np.asarray(self.values - corrected)
 
     def joint_covariance(self, of_parameters: Array) -> Array:
         """Covariance (p + 6 m, p + 6 m) of the free parameters (p, p) and the coefficients."""

@@ -10,6 +10,7 @@ class Finding(StrEnum):
     """What the records say of a term."""
 
     TAKEN = "taken"
+    KNOWN = "known from an earlier result"
     NOT_SHOWN = "not shown"
     NOT_PREDICTED = "does not predict the records of other points better"
     FAULTS = "faults of records explain them better"

@@ -111,6 +111,7 @@ def approval_question(proposal: Proposal) -> Question:
         improvement,
         cell=proposal.cell,
         corrections=proposal.change.changed_corrections,
+        found=state.found_terms,
     )
 
 

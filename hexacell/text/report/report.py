@@ -34,6 +34,7 @@ def report_of(run: ReportedRun, earlier: ReportedRun | None = None) -> Report:
         results.figure_chapter(run),
         results.uncertainty_chapter(run),
         results.parameter_chapter(run),
+        results.terms_chapter(run),
         None if earlier is None else results.comparison_chapter(earlier, run),
         results.observability_chapter(run),
         conditions_chapter(run),

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hexacell.identification.identified_zeros import ParameterChoice
+from hexacell.kinematics.parameters import LEGS
 from hexacell.lengths import unit_of
 from hexacell.results.run_comparison import compare_results
 from hexacell.services.history.reported_run import ReportedRun
@@ -16,6 +17,8 @@ from hexacell.text.parameters import ParameterRow, rows_of_changes, rows_of_run
 from hexacell.text.planning import quick_accuracy_sentences
 from hexacell.text.report.pages import Chapter, Paragraph, Picture, Table
 from hexacell.text.svg_drawing import AFTER, BEFORE, INK, SMALLEST_MM, as_svg, new_figure
+from hexacell.text.terms import run_terms_text
+from hexacell.uncertainty.statement import COVERAGE_FACTOR
 from procedures.run.keys import Phase
 
 AXES_PLACE = (0.12, 0.17, 0.87, 0.72)
@@ -108,6 +111,20 @@ def parameter_chapter(run: ReportedRun) -> Chapter | None:
         "change; the controller's config has the new one in the frames in which the task poses move least."
     )
     return Chapter("Identified geometry", (_parameter_table(rows, "old", "new"), Paragraph(text)))
+
+
+def terms_chapter(run: ReportedRun) -> Chapter | None:
+    """What was found beside the geometry, a row a joint or leg; None where nothing was."""
+    text, taken = run_terms_text(run.state), run.state.found_terms.taken
+    if not text:
+        return None
+    columns, rows = ["Joint or leg"], [[str(number + 1)] for number in range(LEGS)]
+    for term in taken:
+        columns += [f"{term.name}, {term.unit}", "U (k = 2)"]
+        for row, value, sigma in zip(rows, term.values or (), term.sigma or (), strict=True):
+            row += [f"{value:.3f}", f"{COVERAGE_FACTOR * sigma:.3f}"]
+    table = (Table(tuple(columns), tuple(map(tuple, rows))),) if taken else ()
+    return Chapter("What is not geometry", (*table, Paragraph(text)))
 
 
 def comparison_chapter(earlier: ReportedRun, run: ReportedRun) -> Chapter:

@@ -29,9 +29,7 @@ def run_terms_text(state: RunState) -> str:
     found = found_sentence(state.found_terms)
     if not found or state.identified is None:
         return ""
-    verified = None if state.judged is None else state.judged.verification
-    accuracy = None if verified is None else verified.accuracy
-    gain = improvement_sentence(state.identified.improvement, accuracy)
+    gain = improvement_sentence(state.identified.improvement, state.accuracy)
     return f"{found} {gain}".strip()
 
 

@@ -14,7 +14,7 @@ from hexacell.campaign.decisions import Forecast
 from hexacell.lengths import unit_of
 from hexacell.text.layout import COLUMNS, duration, wrapped
 from hexacell.text.measured_noise import measured_noise_text, reversal_sentence
-from hexacell.text.planning import quick_accuracy_text, run_forecast_line
+from hexacell.text.planning import quick_accuracy_sentences, run_forecast_line
 from hexacell.text.terms import run_terms_text
 from hexacell.text.verdict import check_text, length_text, start_text, verification_text
 from procedures.journal.journal import Entry
@@ -87,7 +87,7 @@ class EventFormatter:
                 self._forecast = expected.forecast
             case events.SetClosed(at=SetKey(phase=Phase.IDENTIFY)) if self._forecast is not None:
                 # Of the move before it, which predicted the error with this set.
-                forecast = run_forecast_line(self._forecast)
+                forecast = wrapped(run_forecast_line(self._forecast), indent=2)
         return [text for text in (event_text(event, state), forecast) if text]
 
     def status_text(self, expected: int) -> str:
@@ -116,7 +116,13 @@ def activity(event: events.Event) -> str | None:
 
 
 def event_text(event: events.Event, state: RunState) -> str | None:
-    """What an event reports, if anything; ``state`` includes the event."""
+    """What an event reports, if anything, in lines that fit a terminal; ``state`` includes the event."""
+    text = _whole_text(event, state)
+    return None if text is None else "\n".join(wrapped(line, indent=2) for line in text.splitlines())
+
+
+def _whole_text(event: events.Event, state: RunState) -> str | None:
+    """What an event reports, in lines of any length."""
     match event:
         case events.RunStarted(mode=mode, accepted=accepted):
             what = "quick level" if mode == "quick" else "check"
@@ -125,21 +131,18 @@ def event_text(event: events.Event, state: RunState) -> str | None:
             noise = measured_noise_text(event.noise, with_averaging=True)
             pilots = len(state.set(event.at).pilots)
             meanwhile = f"meanwhile {pilots} pilot poses were read, by which the next ones are chosen"
-            return f"{noise}\n{wrapped(meanwhile, indent=2)}" if pilots else noise
+            return f"{noise}\n{meanwhile}" if pilots else noise
         case events.Identified(quick=quick, reversal=reversal):
-            found = "" if reversal is None else wrapped(reversal_sentence(reversal), indent=2)
-            return (
-                "\n".join(filter(None, ["" if quick is None else quick_accuracy_text(quick), found]))
-                or None
-            )
+            known = "" if quick is None else f"quick level: {quick_accuracy_sentences(quick)}"
+            found = "" if reversal is None else reversal_sentence(reversal)
+            return "\n".join(filter(None, [known, found])) or None
         case events.ResultValidated():
             if event.verification is not None:
-                found = wrapped(f"  {run_terms_text(state)}".rstrip(), indent=2)
+                found = f"  {run_terms_text(state)}".rstrip()
                 return "\n".join(filter(None, [verification_text(event.verification), found]))
             check = None if event.check is None else check_text(event.check)
             return check if event.length is None else length_text(event.length)
-    text = event.text(state)
-    return None if text is None else "\n".join(wrapped(line, indent=2) for line in text.splitlines())
+    return event.text(state)
 
 
 def run_story(entries: Iterable[Entry]) -> Iterator[tuple[Entry, str]]:

@@ -11,7 +11,7 @@ from hexacell.dry_run.verdict_forecast import NOISE, WANTED, VerdictForecast
 from hexacell.lengths import shown, unit_of
 from hexacell.measurements.records import RecordId
 from hexacell.services.offline import PlanTrial
-from hexacell.text.layout import duration, wrapped
+from hexacell.text.layout import duration
 from hexacell.text.measured_noise import averaging_lines
 from hexacell.verdict.decision import Verdict
 
@@ -182,11 +182,6 @@ def _rounded_up(limit: float) -> float:
 
 def _percent(share: float) -> str:
     return f"{share:.0%}" if share < 0.995 else f"{share:.1%}"
-
-
-def quick_accuracy_text(found: QuickAccuracy) -> str:
-    """How well the robot is known by it, and what more records would give, in lines."""
-    return wrapped(f"quick level: {quick_accuracy_sentences(found)}", indent=2)
 
 
 def quick_accuracy_sentences(found: QuickAccuracy) -> str:

@@ -8,7 +8,7 @@ from hexacell.checks.check_result import CheckResult
 from hexacell.lengths import from_to, unit_of
 from hexacell.results.result import AcceptedResult, ExpectedImprovement, LengthResult
 from hexacell.results.written_geometry import TaskDisplacement
-from hexacell.text.layout import change_with_sigma, wrapped
+from hexacell.text.layout import change_with_sigma
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy
 from hexacell.verdict.length_check import LengthStatement
@@ -40,7 +40,7 @@ def verification_text(verified: Verification) -> str:
         worse = ", significantly worse" if verified.is_worse else ""
         means = from_to(verified.before_mm, verified.after_mm, 2)
         lines.append(f"  mean deviation at held-out poses {means}{worse}")
-    lines += [f"  {wrapped(test.sentence, indent=2)}" for test in verified.tests if not test.passed]
+    lines += [f"  {test.sentence}" for test in verified.tests if not test.passed]
     if verified.accuracy is not None:
         lines += [f"  {line}" for line in scale_lines(verified.accuracy.length, verified.accuracy.scale_of)]
     return "\n".join(lines)
@@ -75,7 +75,7 @@ def check_text(found: CheckResult) -> str:
     """A few lines on a check: the verdict, the error now, and what has changed."""
     lines = [f"verdict: {found.verdict}", *_error_lines(found.accuracy), *_change_lines(found)]
     if found.alarm is not None and found.alarm.is_raised:
-        lines.append(wrapped(f"  {alarm_sentence(found.alarm)}", indent=2))
+        lines.append(f"  {alarm_sentence(found.alarm)}")
     if not found.is_consistent:
         lines.append("  the residuals are larger than the stated noise explains: the model does not hold")
     if found.accuracy is not None:
@@ -132,7 +132,7 @@ def scale_lines(length: LengthResult | None, scale_of: str = "encoders") -> list
         f"No geometry corrects that: multiply the scale factor of all encoders by {length.factor:.6f}, at "
         "the drives and in [encoders] measuring_step_nm, and calibrate again."
     )
-    return [checked, wrapped(f"  {remedy}", indent=2).strip()]
+    return [checked, remedy]
 
 
 def earlier_scale_line(length: LengthResult | None, scale_of: str = "encoders") -> str:
@@ -147,14 +147,14 @@ def length_text(stated: LengthStatement) -> str:
     result, error = stated.result, stated.error
     lines = [f"verdict: {stated.verdict}"]
     if not result.is_consistent:
-        return "\n".join([*lines, wrapped(f"  the length check says nothing: {result.reason}", indent=2)])
+        return "\n".join([*lines, f"  the length check says nothing: {result.reason}"])
     lines += [f"  {line}" for line in scale_lines(result)]
     if error is not None:
         size = f"{_size(error, 'mm')} ({error.rule('mm')})"
         lines.append(f"  position error by that at the task poses: {size}")
     largest = sorted(result.sources, key=lambda source: -source.um_m)[:NAMED_SOURCES]
     named = ", ".join(f"{source.name} {source.um_m:.1f}" for source in largest)
-    return "\n".join([*lines, wrapped(f"  uncertainty, um/m, 1 sigma: {named}", indent=2)])
+    return "\n".join([*lines, f"  uncertainty, um/m, 1 sigma: {named}"])
 
 
 def gate_lines(gates: Sequence[AcceptanceGate]) -> str:

@@ -3,9 +3,13 @@
 from datetime import UTC, datetime
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from hexacell.checks.check_result import CheckResult, ParameterChange, check_line
 from hexacell.results.written_geometry import TaskDisplacement
+from hexacell.text.layout import COLUMNS
+from hexacell.text.line_face import event_text
 from hexacell.text.verdict import (
     check_text,
     not_checked,
@@ -13,9 +17,11 @@ from hexacell.text.verdict import (
     teaching_sentence,
     verification_text,
 )
-from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy
+from hexacell.verdict.decision import GeometryErrors, JudgedError, Verdict, VerifiedAccuracy
 from hexacell.verdict.model_evidence import ModelTest
 from hexacell.verdict.verification import Verification
+from procedures.run.state import RunState
+from procedures.steps import events
 
 WHEN = datetime(2026, 11, 20, 2, 30, tzinfo=UTC)
 
@@ -67,6 +73,27 @@ def test_a_verdict_fits_six_lines_with_what_must_be_taught_anew() -> None:
     lines = verification_text(failed).splitlines()
     assert lines[0] == "verdict: not evaluated"
     assert ("  Test 1." in lines, "  Test 0." in lines) == (True, False)
+
+
+SIZES_MM = st.floats(1e-5, 1e4)
+
+
+@given(SIZES_MM, SIZES_MM, SIZES_MM, st.sampled_from(Verdict), st.integers(1, 90))
+def test_no_line_of_a_verdict_is_wider_than_a_terminal(value, expanded, limit, verdict, words) -> None:
+    position = JudgedError(value=value, expanded=expanded, limit=limit, verdict=verdict)
+    errors = accuracy().model_copy(update={"position": position, "poses": 1024, "task_named": False})
+    geometry = GeometryErrors(position=position, orientation=errors.orientation)
+    failed = ModelTest(name="test", passed=False, sentence="Much " * words)
+    verified = Verification(
+        verdict=verdict,
+        tests=(failed,),
+        accuracy=errors.model_copy(update={"of_geometry": geometry}),
+        before_mm=value,
+        after_mm=expanded,
+    )
+    told = event_text(events.ResultValidated(verdict=verdict, line="", verification=verified), RunState())
+    assert told is not None
+    assert max(map(len, told.splitlines())) <= COLUMNS
 
 
 @pytest.mark.parametrize(

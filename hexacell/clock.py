@@ -35,3 +35,20 @@ class CellClock:
     def wait(self, seconds: float, until: threading.Event) -> None:
         """Sleep in a thread; returns early when ``until`` is set."""
         until.wait(self.real_seconds(seconds))
+
+
+class Patience:
+    """The time left for an answer that is waited for in slices.
+
+    Where a slice took longer, this process was not scheduled, and the device is not to blame: no more than
+    the slice counts.
+    """
+
+    def __init__(self, seconds: float, slice_s: float, now_s: float) -> None:
+        self._left_s, self._slice_s, self._seen_s = seconds, slice_s, now_s
+
+    def left_s(self, now_s: float) -> float:
+        """Seconds that are left; to be asked once a slice."""
+        self._left_s -= min(now_s - self._seen_s, self._slice_s)
+        self._seen_s = now_s
+        return self._left_s

@@ -13,6 +13,7 @@ import canopen
 
 from drivers.errors import BusError
 from drivers.wire_trace import LineRecord, TraceRecorder, TrafficDirection
+from hexacell.clock import Patience
 
 SLICE_S = 0.03
 """Longest wait without a check whether it was interrupted."""
@@ -72,14 +73,13 @@ class EncoderBus:
 
     def wait_for(self, ready: Callable[[], bool], timeout_s: float) -> bool:
         """Wait until ``ready()``; false after ``timeout_s``."""
-        deadline = time.monotonic() + timeout_s
         with self.condition:
+            patience = Patience(timeout_s, SLICE_S, time.monotonic())
             while not ready():
                 self.check()
-                left = deadline - time.monotonic()
-                if left <= 0:
+                if (left_s := patience.left_s(time.monotonic())) <= 0:
                     return False
-                self.condition.wait(min(left, SLICE_S))
+                self.condition.wait(min(left_s, SLICE_S))
         return True
 
     def listen(self, seconds: float) -> None:

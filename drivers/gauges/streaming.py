@@ -12,8 +12,10 @@ from drivers.errors import EmptyChannel, GaugeSilent
 from drivers.gauges.protocol import FrameRejected
 from drivers.gauges.serial_gauge import ValueOnlyGauge
 from drivers.interfaces import GaugeReading
+from drivers.serial.opening import SLICE_S
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
+from hexacell.clock import Patience
 from hexacell.errors import DeviceError
 
 
@@ -72,7 +74,8 @@ class StreamingGauge(ValueOnlyGauge):
     async def _ask(self, _request: bytes) -> bytes:
         """The next fresh frame of this gauge."""
         port = self._open_port()
-        deadline_s = max(port.listened.now(), self._fresh_from_s) + self.settings.timeout_s
+        now_s = port.listened.now()
+        patience = Patience(max(0.0, self._fresh_from_s - now_s) + self.settings.timeout_s, SLICE_S, now_s)
         heard: dict[Origin, bytes] = {}
         while True:
             for frame in port.listened.log.after(self._latest):
@@ -83,7 +86,7 @@ class StreamingGauge(ValueOnlyGauge):
                 if origin is Origin.OWN:
                     return frame.data
                 heard[origin] = frame.data
-            if port.listened.now() >= deadline_s:
+            if patience.left_s(port.listened.now()) <= 0.0:
                 raise self._missing(heard)
             await port.listen()
             port = self._open_port()

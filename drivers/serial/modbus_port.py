@@ -7,15 +7,20 @@ its checksum; an answer is the registers. No call takes longer than the time-out
 import logging
 import struct
 import termios
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from typing import Any
+
+import serial
 
 from drivers.libraries import optional
 from drivers.serial.framing import is_copies
-from drivers.serial.opening import lost_port, opened_port
+from drivers.serial.opening import SLICE_S, lost_port, opened_port
 from drivers.serial.request_port import NoAnswer, RequestPort
 from drivers.wire_trace import TrafficDirection
+from hexacell.clock import Patience
 from hexacell.errors import DeviceError
 
 EXTRA = "modbus"
@@ -66,9 +71,11 @@ class ModbusPort(RequestPort):
                 self.url, retries=0, trace_packet=self._note, **line
             )
             # Not by its own connect(), which gives no cause and configures a pseudo-terminal twice.
-            client.socket = opened_port(
+            port: Any = opened_port(
                 self.url, line, self.subject, self._closing, client.inter_byte_timeout or None
             )
+            port.write = partial(_sent, port.write)
+            client.socket, client.recv = port, self._next_bytes
             self._client = client
             self.open_count += 1
             self._must_clear = False
@@ -115,6 +122,19 @@ class ModbusPort(RequestPort):
             with suppress(OSError, termios.error):
                 client.close()
 
+    def _next_bytes(self, _size: int | None) -> bytes:
+        """What comes until the line pauses; nothing if nothing comes in time."""
+        port, count = self._client.socket, 0
+        patience = Patience(self._client.comm_params.timeout_connect, SLICE_S, time.monotonic())
+        while patience.left_s(time.monotonic()) > 0.0:
+            self.require_not_closed()
+            before, count = count, port.in_waiting
+            if count and count == before:
+                break
+            time.sleep(self._client._recv_interval)
+        received: bytes = port.read(count)
+        return received
+
     def _is_alone(self, frame_bytes: int) -> bool:
         """Whether what came is one frame, or copies of it, which some adapters send."""
         frames = self._received.lstrip(NUL)
@@ -155,3 +175,13 @@ class ModbusPort(RequestPort):
         except (OSError, termios.error, self._modbus.exceptions.ModbusException) as error:
             self.close()
             raise lost_port(self.subject, self.url, str(error)) from error
+
+
+def _sent(write: Callable[[bytes], object], data: bytes) -> int:
+    """Write a request, whose answer shows whether it arrived; to pymodbus the error means a lost line.
+
+    pyserial also raises it if all was sent and this thread was then not scheduled for so long.
+    """
+    with suppress(serial.SerialTimeoutException):
+        write(data)
+    return len(data)

@@ -14,10 +14,11 @@ from math import inf
 import serial
 
 from drivers.serial.framing import FRAME_LIMIT, LINE_ENDS, FrameLog, cut_frame, is_copies
-from drivers.serial.opening import close_port, lost_port, opened_port
+from drivers.serial.opening import SLICE_S, close_port, lost_port, opened_port
 from drivers.serial.parity import have_terminal_check, in_software
 from drivers.serial.request_port import WORST_LATENCY_S, NoAnswer, RequestPort
 from drivers.wire_trace import TraceRecorder, TrafficDirection
+from hexacell.clock import Patience
 from hexacell.errors import DeviceError
 
 FRAME_GAP_S = 0.1
@@ -127,9 +128,10 @@ class SerialPort(RequestPort):
         """Read unsolicited bytes until the line has been silent as long as required."""
         surplus, self._surplus = self._surplus, b""
         self._require_silence_after(surplus)
-        deadline = time.monotonic() + SILENCE_ATTEMPTS * max(self._silence_s, FRAME_GAP_S)
+        longest_s = SILENCE_ATTEMPTS * max(self._silence_s, FRAME_GAP_S)
+        patience = Patience(longest_s, SLICE_S, time.monotonic())
         while time.monotonic() - self._last_traffic < self._silence_s or port.in_waiting:
-            if time.monotonic() > deadline:
+            if patience.left_s(time.monotonic()) < 0.0:
                 raise self._not_silent()
             surplus += self._read(port)
             self._require_silence_after(surplus)
@@ -162,8 +164,8 @@ class SerialPort(RequestPort):
             self.unsolicited.append(surplus)
 
     def _frame(self, port: serial.Serial, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
-        received = b""
-        while len(received) <= FRAME_LIMIT and time.monotonic() < self._asked_at + timeout_s:
+        received, patience = b"", Patience(timeout_s, SLICE_S, self._asked_at)
+        while len(received) <= FRAME_LIMIT and patience.left_s(time.monotonic()) > 0.0:
             received += self._read(port)
             if cut := cut_frame(received, request, terminator):
                 self._last_frame, self._surplus = cut

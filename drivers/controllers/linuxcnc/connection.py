@@ -13,6 +13,7 @@ from drivers.controllers.linuxcnc import protocol
 from drivers.errors import ConnectionLost, ResponseTimeout
 from drivers.wire_trace import LineRecord, TraceRecorder, TrafficDirection
 from hexacell.cell.robot import ControllerSettings
+from hexacell.clock import Patience
 from hexacell.errors import DeviceError
 
 _log = logging.getLogger("drivers.controllers.linuxcnc")
@@ -20,6 +21,7 @@ _log = logging.getLogger("drivers.controllers.linuxcnc")
 _CLIENT = "hexacell 1.0"
 _CHUNK = 4096
 _SHOWN = 80
+_SLICE_S = 0.05
 PARSED_S = 0.02
 """Within this time, s, LinuxCNC has read a command that was sent."""
 
@@ -185,9 +187,9 @@ class Connection:
     async def _greet(self) -> None:
         password = self.settings.connect_password.get_secret_value()
         await self._write(protocol.encode_command(f"hello {password} {_CLIENT}", self.subject))
-        deadline = protocol.loop_time() + self._timeouts.answer
+        patience = _patience(self._timeouts.answer)
         try:
-            while (line := await self._line(deadline)).lower().startswith("warning:"):
+            while (line := await self._line(patience)).lower().startswith("warning:"):
                 pass
         except TimeoutError:
             if self._buffer.rest:
@@ -210,7 +212,7 @@ class Connection:
                 raise self._not_linuxcncrsh(line)
         await self._write(protocol.encode_command("set echo off", self.subject))
         with suppress(TimeoutError):  # the only response, if any, is the echo
-            await self._line(protocol.loop_time() + self._timeouts.explanation)
+            await self._line(_patience(self._timeouts.explanation))
         await self.request("set verbose on")
 
     def _not_linuxcncrsh(self, said: str) -> DeviceError:
@@ -229,13 +231,13 @@ class Connection:
             raise ConnectionLost("closed the connection", subject=self.subject) from error
 
     async def _outstanding_response(self, command: str, timeout_s: float) -> protocol.Response:
-        deadline = protocol.loop_time() + timeout_s
-        remarks: list[str] = []
+        patience, remarks = _patience(timeout_s), list[str]()
         try:
-            while (answer := protocol.parse_response(line := await self._line(deadline), command)) is None:
+            while (answer := protocol.parse_response(line := await self._line(patience), command)) is None:
                 if explanation := protocol.parse_explanation(line):
                     remarks.append(explanation)
-                    deadline = min(deadline, protocol.loop_time() + self._timeouts.explanation)
+                    left_s = patience.left_s(protocol.loop_time())
+                    patience = _patience(min(left_s, self._timeouts.explanation))
         except TimeoutError:
             if remarks:  # 2.10 refuses without a NAK while another client moves the machine
                 self._outstanding = None
@@ -250,13 +252,18 @@ class Connection:
         self._outstanding = None
         return protocol.Response(answer.accepted, answer.text, tuple(remarks))
 
-    async def _line(self, deadline: float) -> str:
+    async def _line(self, patience: Patience) -> str:
         while not self._lines:
-            async with asyncio.timeout_at(deadline):
-                try:
-                    data = await self._reader.read(_CHUNK)
-                except OSError:
-                    data = b""
+            if (left_s := patience.left_s(protocol.loop_time())) <= 0.0:
+                raise TimeoutError
+            try:
+                async with asyncio.timeout(min(left_s, _SLICE_S)):
+                    try:
+                        data = await self._reader.read(_CHUNK)
+                    except OSError:
+                        data = b""
+            except TimeoutError:
+                continue
             self._record(TrafficDirection.RECEIVED, data)
             if not data:
                 _log.warning("%s: the connection was closed", self.subject)
@@ -271,6 +278,11 @@ class Connection:
     def _record(self, direction: TrafficDirection, data: bytes) -> None:
         if self._wire.is_on:
             self._wire.add(direction, without_passwords(data, self.settings))  # traces are handed to others
+
+
+def _patience(seconds: float) -> Patience:
+    """With what begins to wait now."""
+    return Patience(seconds, _SLICE_S, protocol.loop_time())
 
 
 def without_passwords(data: bytes, settings: ControllerSettings) -> bytes:

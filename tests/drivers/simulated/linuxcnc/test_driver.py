@@ -71,7 +71,7 @@ async def test_an_unreachable_pose_while_another_client_waits_for_no_completion(
 
 
 async def test_a_frozen_controller_and_one_that_was_ended_are_told_apart(driver, simulated) -> None:
-    hasty = driver(Timeouts(connect=0.5, answer=0.2, stop=1.0))
+    hasty = driver(Timeouts(connect=10.0, answer=0.3, stop=10.0))
     await hasty.open()
     await hasty.prepare(ALL)
     before = await hasty.status()

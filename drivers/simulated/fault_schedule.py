@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from operator import itemgetter
 from pathlib import Path
 
 from drivers.simulated.encoders.bank import SimulatedDbcBank, SimulatedEncoderBank
@@ -91,7 +92,7 @@ def _set_stop_file(stop_file: Path, *, on: bool) -> None:
 
 
 class FaultSchedule(Closeable):
-    """Injects and clears scheduled faults, from timers.
+    """Injects and clears scheduled faults, from timers, in the order in which they are due.
 
     Attributes:
         move_count: how many moves have started.
@@ -107,24 +108,27 @@ class FaultSchedule(Closeable):
         self._faults = faults
         self._clock = clock
         self._waiting: list[SimulatedFault] = []
+        self._due: list[tuple[float, Callable[[], None]]] = []
         self._timers: list[threading.Timer] = []
         self._is_closed = False
-        self._lock = threading.Lock()
+        self._lock, self._one_at_a_time = threading.Lock(), threading.Lock()
         for fault in planned:
             self.schedule(fault)
 
     def schedule(self, fault: SimulatedFault) -> None:
-        """Schedule a fault: in a move, or some time after now.
+        """Schedule a fault: in a move, some time after now, or at once: then it is there on return.
 
         Raises:
             UsageError: it cannot be simulated.
         """
         self._faults.check(fault.kind, fault.device)
         with self._lock:
-            if fault.at_move is None:
-                self._enqueue(fault)
-            else:
+            if fault.at_move is not None:
                 self._waiting.append(fault)
+                return
+            timers = self._enqueue(fault)
+        if timers and not fault.after_s:
+            timers[0].join()
 
     def on_motion_start(self) -> None:
         """Count a move, and schedule the faults that wait for it."""
@@ -141,11 +145,23 @@ class FaultSchedule(Closeable):
             timer.cancel()
             timer.join()
 
-    def _enqueue(self, fault: SimulatedFault) -> None:
+    def _enqueue(self, fault: SimulatedFault) -> list[threading.Timer]:
         switches = [(fault.after_s, self._faults.inject)]
         if fault.lasts_s is not None:
             switches.append((fault.after_s + fault.lasts_s, self._faults.clear))
+        timers = []
         for after_s, switch in switches if not self._is_closed else ():
-            timer = threading.Timer(self._clock.real_seconds(after_s), switch, (fault.kind, fault.device))
-            self._timers.append(timer)
-            timer.start()
+            due_s, carry_out = self._clock.now() + after_s, partial(switch, fault.kind, fault.device)
+            self._due.append((due_s, carry_out))
+            timers.append(threading.Timer(self._clock.real_seconds(after_s), self._do_next))
+            timers[-1].start()
+        self._timers += timers
+        return timers
+
+    def _do_next(self) -> None:
+        """Do what is due first: on a busy machine a timer may be later than the one after it."""
+        with self._one_at_a_time:
+            with self._lock:
+                first = min(self._due, key=itemgetter(0))
+                self._due.remove(first)
+            first[1]()

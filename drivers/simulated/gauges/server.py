@@ -21,7 +21,7 @@ from hexacell.clock import CellClock
 COMMAND_LIMIT = 256
 SHORTEST_PERIOD_S = 0.005
 """Shortest period of what is sent unasked, s of real time, however quick the cell's clock is."""
-JOB_TIMEOUT_S = 5.0
+JOB_TIMEOUT_S = 60.0
 _log = logging.getLogger(__name__)
 LATE_TIMEOUTS = 1.5
 """A late answer comes after so many of the driver's time-outs."""

@@ -15,7 +15,7 @@ from hexacell.cli.app import main
 from hexacell.runs.archive import INDEX
 from procedures.journal.journal import read_journal
 from procedures.steps import events
-from tests.cli.cell_folder import QUICK, SHORT, CellFolder, copy_cell
+from tests.cli.cell_folder import PATIENT, QUICK, SHORT, CellFolder, copy_cell
 from tests.cli.commands import Outcome, Start, run_command, started_in
 from tests.cli.terminal import Terminal
 from tests.made_once import made_once
@@ -95,7 +95,7 @@ def served_cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """
     folder = tmp_path_factory.mktemp("served")
     cell = copy_cell(folder)
-    cell.edit(*SHORT)
+    cell.edit(*SHORT, *PATIENT)
     with started_in(folder) as start:
         process = start("simulate", cell.cell)
         process.wait_for("serving", lambda: process.err)

@@ -5,7 +5,9 @@ import re
 import tomllib
 from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import count
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from serial.tools import list_ports
@@ -19,6 +21,7 @@ from hexacell.cell.loader import load_cell
 from hexacell.cell.simulation import SimulatedGauges
 from hexacell.clock import CellClock
 from hexacell.errors import ExitCode
+from hexacell.services.devices import device_diagnosis
 from hexacell.services.devices.device_search import search_devices
 from tests.cli.terminal import ended, start_at
 from tests.drivers.encoders.dbc.conftest import SIGNALS, dbc_text
@@ -241,8 +244,11 @@ def test_one_device_is_watched(typed_here, served_cell, device, rows) -> None:
     ],
 )
 def test_what_comes_instead_of_readings_is_counted_by_kind(
-    typed_here, cell_folder, fault, kind, meaning
+    typed_here, cell_folder, monkeypatch, fault, kind, meaning
 ) -> None:
+    """Of as many readings on any machine: twenty a second by this clock."""
+    clock = SimpleNamespace(monotonic=partial(next, count(0.0, 0.05)))
+    monkeypatch.setattr(device_diagnosis, "time", clock)
     with cell_folder.cell.open("a") as cell:
         cell.write(f'\n[[simulation.faults]]\nkind = "{fault}"\ndevice = "x"\n')
     outcome = typed_here(

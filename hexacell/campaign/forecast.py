@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -81,7 +81,7 @@ class Forecaster:
         if selected is not None:
             record = selected.record
             after = error.worst(
-                covariance_update(belief.covariance, record.jacobian[0], record.covariance[0])
+                covariance_update(belief.joint_covariance, record.jacobian[0], record.covariance[0])
             )
         planned = self.planned(state)
         end = error.worst(self._covariance_after(belief, state, planned))
@@ -131,17 +131,17 @@ class Forecaster:
         gains: dict[int, float] = {}
         rates: dict[int, float] = {}
         for point in points:
-            options = self._options(state, belief.covariance, information, error, point)
+            options = self._options(state, belief.joint_covariance, information, error, point)
             gains[point] = max((gain for gain, _ in options), default=0.0)
             rates[point] = max((rate for _, rate in options), default=-math.inf)
         return PointRanking(gains, max(points, key=rates.__getitem__))
 
     def predicted_belief(self, belief: RobotBelief, state: CampaignState) -> RobotBelief:
         """What will be known once everything that is still planned is measured."""
-        return replace(belief, covariance=self._covariance_after(belief, state, self.planned(state)))
+        return belief.knowing(self._covariance_after(belief, state, self.planned(state)))
 
     def known_beside_next(self, belief: RobotBelief, state: CampaignState) -> Array:
-        """The covariance (p, p), mm^2, once all that is planned is measured but the point's next record."""
+        """:attr:`.RobotBelief.joint_covariance` after all that is planned but the point's next record."""
         planned = self.planned(state)
         others = {point: more - (point == state.point) for point, more in planned.items()}
         return self._covariance_after(belief, state, others)
@@ -150,10 +150,10 @@ class Forecaster:
         self, belief: RobotBelief, state: CampaignState, planned: Mapping[int, int]
     ) -> Array:
         if not any(planned.values()):
-            return belief.covariance
+            return belief.joint_covariance
         information = _planned_information(self, belief, frozenset(planned))
         added = [information.added(state, point, more) for point, more in planned.items()]
-        return add_information(belief.covariance, np.sum(added, axis=0))
+        return add_information(belief.joint_covariance, np.sum(added, axis=0))
 
     def sets_at(self, points: Container[int]) -> list[PoseBatch]:
         """The planned sets of some points, and empty ones of the others, which would only take time."""
@@ -195,7 +195,7 @@ class PlannedInformation:
     """The records of a set of poses at each point, linearized.
 
     Attributes:
-        jacobian: derivatives (n, 3, p) of all sets' records by the free parameters.
+        jacobian: derivatives (n, 3, p + 6 m) of all sets' records by parameters and terms' coefficients.
         weights: inverse covariances of the records (n, 3, 3), 1/mm^2.
         bounds: (m + 1,) rows at which the sets begin, and the last one ends.
     """
@@ -210,12 +210,13 @@ class PlannedInformation:
         poses = PoseBatch.joined(sets)
         joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
         rows = np.flatnonzero(np.isfinite(joints).all(axis=-1))
-        jacobian, by_joints = position_derivatives(belief, ReachableTargets(poses[rows], joints[rows]))
+        reached = ReachableTargets(poses[rows], joints[rows])
+        jacobian, by_joints = position_derivatives(belief, reached, _one_after_another(reached.joints))
         ends = np.cumsum([len(poses) for poses in sets])
         return cls(jacobian, belief.noise.record_weights(by_joints), np.searchsorted(rows, [0, *ends]))
 
     def information(self, point: int, records: int) -> Array:
-        """The information (p, p), 1/mm^2, of the first ``records`` of a point, counted from 1."""
+        """The information (p + 6 m, p + 6 m) of the first ``records`` of a point, counted from 1."""
         first, last = self.bounds[point - 1], self.bounds[point]
         rows = slice(int(first), int(min(first + max(records, 0), last)))
         jacobian, weights = self.jacobian[rows], self.weights[rows]
@@ -233,6 +234,11 @@ class PlannedInformation:
         before = state.records_at(point)
         added = self.information(point, before + records)
         return added - self.information(point, before) if before else added
+
+
+def _one_after_another(joints: Array) -> Array:
+    """The directions (n, 6) from which joints arrive that are moved from each of n poses to the next."""
+    return np.sign(np.diff(joints, axis=0, prepend=joints[:1]))
 
 
 @lru_cache(maxsize=1)
@@ -264,11 +270,14 @@ def _select(drawn: RobotBelief, poses: PoseBatch, records: int) -> PoseBatch:
         return poses[[]]
     selected = [0]
     jacobian, by_joints = position_derivatives(drawn, targets)
-    change = jacobian - jacobian[0]
+    free = jacobian[..., : len(drawn.free)]
     noise = drawn.noise.record_covariance(by_joints)
     noise = noise + noise[0]
-    covariance = drawn.covariance
+    covariance = drawn.joint_covariance
     for _ in range(min(records, len(targets)) - 1):
+        arrived = np.sign(targets.joints - targets.joints[selected[-1]])
+        every = np.concatenate([free, drawn.by_terms(targets.poses, targets.joints, arrived)], axis=-1)
+        change = every - every[0]
         gain = D_OPTIMAL.gain(covariance, change, noise)
         gain[selected] = -np.inf
         best = int(np.argmax(gain))

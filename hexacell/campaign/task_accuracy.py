@@ -40,10 +40,12 @@ class TaskError:
     gain: Array | None = None
 
     def variances(self, covariance: Array) -> Array:
-        """Mean square distances (n,), mm^2, under a covariance (p, p) of the estimated free parameters."""
+        """Mean square distances (n,), mm^2, under a covariance of the free parameters, and others after."""
+        free = self.jacobian.shape[-1]
+        covariance = covariance[:free, :free]
         if self.held is not None and self.gain is not None:
             covariance = self.held.covariance(self.gain, covariance)
-        flat = self.jacobian.reshape(-1, len(covariance))
+        flat = self.jacobian.reshape(-1, free)
         squares: Array = np.sum((flat @ covariance) * flat, axis=-1).reshape(self.jacobian.shape[:2])
         return np.asarray(squares.sum(axis=-1))
 

@@ -20,7 +20,10 @@ from hexacell.kinematics.rotations import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Criterion:
-    """An optimality criterion: the ``weight`` (p, p) of the parameters' covariance; None for D."""
+    """An optimality criterion: the ``weight`` (p, p) of the parameters' covariance; None for D.
+
+    What else is unknown comes after the parameters, and has none.
+    """
 
     weight: Array | None = None
 
@@ -35,8 +38,9 @@ class Criterion:
         total = innovation_covariance(covariance, jacobian, noise)
         if self.weight is None:
             return np.asarray(0.5 * (np.linalg.slogdet(total)[1] - np.linalg.slogdet(noise)[1]))
+        weighted = covariance[: len(self.weight)]
         # tr(W C H^T S^-1 H C) is the sum of the products of S^-1 with H C W C H^T, both 3 x 3.
-        removed = _quadratic_forms(covariance @ self.weight @ covariance, jacobian)
+        removed = _quadratic_forms(weighted.T @ self.weight @ weighted, jacobian)
         gain: Array = np.einsum("nij,nji->n", np.linalg.inv(total), removed)
         return gain
 

@@ -81,7 +81,7 @@ def _trials(belief: RobotBelief, found: Identification) -> Iterator[_Trial]:
         records = predict_records(belief, zero, targets)
         spread = SAFETY_SIGMAS * records.sigma
         inside = belief.limits.within_travel(np.zeros(3), spread, TRAVEL_SHARE, surely=True)
-        factors = update_factors(belief.covariance, records.jacobian, records.covariance)
+        factors = update_factors(belief.joint_covariance, records.jacobian, records.covariance)
         for row in np.flatnonzero(inside).tolist():
             yield _Trial(point, targets.poses.rotations[row], commands[[row]], factors[row])
 

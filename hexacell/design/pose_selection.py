@@ -77,15 +77,15 @@ def select_pose(
         zero: of the point's gauges.
         orientations: candidates.
         criterion: what is best.
-        known_then: covariance of the free parameters (p, p), mm^2, beside which a record has to gain; None
-            for the current one.
+        known_then: covariance of parameters and terms (p + 6 m, p + 6 m) beside which a record has to
+            gain; None for the current one.
         rounds: of refinement.
 
     Raises:
         LimitError: none is reachable within the limits and almost surely inside the travel.
     """
     belief = planner.belief
-    covariance = belief.covariance if known_then is None else known_then
+    covariance = belief.joint_covariance if known_then is None else known_then
     space = CandidateSpace(
         belief, zero, lambda some: criterion.gain(covariance, some.jacobian, some.covariance)
     )
@@ -170,7 +170,7 @@ class _PathSearch:
             return None
         row, path = found
         record = records[np.array([row])]
-        gain = D_OPTIMAL.gain(self.planner.belief.covariance, record.jacobian, record.covariance)
+        gain = D_OPTIMAL.gain(self.planner.belief.joint_covariance, record.jacobian, record.covariance)
         return SelectedPose(commands.pose(row), record, float(gain[0]), path.waypoints)
 
     def _first(self, paths_to: Callable[[Rows], list[Path | None]], rows: Rows) -> tuple[int, Path] | None:

@@ -37,8 +37,10 @@ class GaugeZero:
         reference: estimated position (3,), mm, of the ball when they were zeroed.
         orientation: the platform's then (3, 3), under the estimate.
         joints: joint variables then (6,), mm.
-        jacobian: derivative (3, p) of ``reference`` by the free parameters.
-        covariance: of ``reference`` (3, 3), mm^2, the parameters being known.
+        jacobian: derivative (3, p + 6 m) of ``reference`` by the free parameters and the coefficients of
+            m terms.
+        covariance: of ``reference`` (3, 3), mm^2, these being known.
+        before: joint variables (6,), mm, where the robot is before the next pose.
     """
 
     reference: Array
@@ -46,6 +48,7 @@ class GaugeZero:
     joints: Array
     jacobian: Array
     covariance: Array
+    before: Array
 
     @cached_property
     def target(self) -> ReachableTargets:
@@ -63,7 +66,7 @@ class GaugeZero:
 
 
 def estimate_gauge_zero(
-    belief: RobotBelief, poses: PoseBatch, joints: Array, deviations: Array
+    belief: RobotBelief, poses: PoseBatch, joints: Array, deviations: Array, directions: Array | None = None
 ) -> GaugeZero:
     """The weighted mean of the zeros by each of a point's records (n).
 
@@ -72,11 +75,12 @@ def estimate_gauge_zero(
         poses: of the records, under the estimate; the first is the reference.
         joints: joint variables (n, 6), mm.
         deviations: what the gauges showed (n, 3), mm.
+        directions: from which the joints arrived (n, 6); None: not known.
 
     Raises:
         LimitError: all poses are at a singularity, where the records have no information.
     """
-    jacobian, by_joints = position_derivatives(belief, ReachableTargets(poses, joints))
+    jacobian, by_joints = position_derivatives(belief, ReachableTargets(poses, joints), directions)
     weights = belief.noise.record_weights(by_joints)
     try:
         covariance = np.linalg.inv(weights.sum(axis=0))
@@ -85,21 +89,28 @@ def estimate_gauge_zero(
     zeros = poses.positions + belief.beside(poses, joints) - deviations
     reference = covariance @ np.einsum("nij,nj->i", weights, zeros)
     mean_jacobian = covariance @ np.einsum("nij,njp->ip", weights, jacobian)
-    return GaugeZero(reference, poses.rotations[0], joints[0], mean_jacobian, covariance)
+    return GaugeZero(reference, poses.rotations[0], joints[0], mean_jacobian, covariance, joints[-1])
 
 
 def gauge_zero_at(belief: RobotBelief, found: Identification, point: int) -> GaugeZero:
     """The zero of a point's gauges by the records of an identification."""
     problem = found.problem
     rows = np.flatnonzero(problem.labels[:, 0] == point)
-    return estimate_gauge_zero(belief, found.poses[rows], problem.joints[rows], problem.deviations[rows])
+    shown = problem.joints[rows], problem.deviations[rows], problem.directions[rows]
+    return estimate_gauge_zero(belief, found.poses[rows], *shown)
 
 
-def position_derivatives(belief: RobotBelief, targets: ReachableTargets) -> tuple[Array, Array]:
-    """Derivatives of the ball's position: (n, 3, p) by the free parameters, (n, 3, 6) by the joints."""
+def position_derivatives(
+    belief: RobotBelief, targets: ReachableTargets, directions: Array | None = None
+) -> tuple[Array, Array]:
+    """Derivatives of the ball's position at n targets where the joints arrive from ``directions`` (n, 6).
+
+    (n, 3, p + 6 m) by the free parameters and the coefficients of m terms, and (n, 3, 6) by the joints.
+    """
     at = belief.mechanism, belief.estimate, targets.poses, targets.joints
     sensitivity = free_sensitivity(*at, POSITION)
-    return sensitivity.free, sensitivity.joints
+    by_terms = belief.by_terms(targets.poses, targets.joints, directions)
+    return np.concatenate([sensitivity.free, by_terms], axis=-1), sensitivity.joints
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,8 +119,8 @@ class PredictedRecords(Batch):
 
     Attributes:
         targets: the poses.
-        jacobian: of the deviations (n, 3, p) by the free parameters.
-        covariance: of the deviations (n, 3, 3), mm^2, the parameters being known.
+        jacobian: of the deviations (n, 3, p + 6 m) by the free parameters and the coefficients of m terms.
+        covariance: of the deviations (n, 3, 3), mm^2, these being known.
         deviation: expected deviations (n, 3), mm.
         sigma: standard deviations (n, 3), mm, of what the gauges x, y, z will show, as the parameters are
             known now, if the robot repeats and readings are exact.
@@ -145,7 +156,8 @@ class PredictedRecords(Batch):
 
 def predict_records(belief: RobotBelief, zero: GaugeZero, targets: ReachableTargets) -> PredictedRecords:
     """The records of some targets at a point whose gauges were zeroed at ``zero``."""
-    return _predicted(belief, zero, targets, *position_derivatives(belief, targets))
+    derivatives = position_derivatives(belief, targets, np.sign(targets.joints - zero.before))
+    return _predicted(belief, zero, targets, *derivatives)
 
 
 def predict_clear_records(
@@ -157,17 +169,19 @@ def predict_clear_records(
     """
     at = belief.mechanism, belief.estimate, targets.poses, targets.joints
     sensitivity, clear = sensitivity_and_margin(*at, POSITION, belief.limits.singularity_margin)
-    records = _predicted(belief, zero, targets, sensitivity.free, sensitivity.joints)
+    by_terms = belief.by_terms(targets.poses, targets.joints, np.sign(targets.joints - zero.before))
+    by_all = np.concatenate([sensitivity.free, by_terms], axis=-1)
+    records = _predicted(belief, zero, targets, by_all, sensitivity.joints)
     return records, clear & (sensitivity.mode == mode)
 
 
 def _predicted(
-    belief: RobotBelief, zero: GaugeZero, targets: ReachableTargets, by_parameters: Array, by_joints: Array
+    belief: RobotBelief, zero: GaugeZero, targets: ReachableTargets, by_all: Array, by_joints: Array
 ) -> PredictedRecords:
     """The records by the derivatives of the ball's position, see :func:`position_derivatives`."""
-    jacobian = by_parameters - zero.jacobian
+    jacobian = by_all - zero.jacobian
     covariance = belief.noise.record_covariance(by_joints) + zero.covariance
-    as_known = innovation_covariance(belief.covariance, jacobian, np.zeros((3, 3)))
+    as_known = innovation_covariance(belief.joint_covariance, jacobian, np.zeros((3, 3)))
     sigma = belief.limits.sigma_along_gauges(as_known)
     by_chance = belief.noise.chance_covariance(by_joints) + zero.covariance
     chance = belief.limits.sigma_along_gauges(by_chance)

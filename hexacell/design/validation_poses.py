@@ -91,7 +91,7 @@ def _stays_inside(belief: RobotBelief, actual: ActualPoses) -> Mask:
     Only those at which the robot keeps its limits too.
     """
     jacobian, by_joints = position_derivatives(belief, ReachableTargets(actual.poses, actual.joints))
-    as_known = innovation_covariance(belief.covariance, jacobian - jacobian[0], np.zeros((3, 3)))
+    as_known = innovation_covariance(belief.joint_covariance, jacobian - jacobian[0], np.zeros((3, 3)))
     sigma = belief.limits.sigma_along_gauges(as_known)
     each = belief.noise.chance_covariance(by_joints)
     chance = belief.limits.sigma_along_gauges(each + each[0])

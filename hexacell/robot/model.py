@@ -28,6 +28,7 @@ from hexacell.identification.problem.commanded_poses import CommandingGeometry
 from hexacell.identification.problem.prior import Noise, Prior, Tolerances
 from hexacell.identification.problem.problem import Assumptions, Problem
 from hexacell.identification.solver.result import GeometryEstimate, Identification
+from hexacell.identification.solver.term_estimates import TermEstimates
 from hexacell.identification.terms.term import ModelTerm
 from hexacell.kinematics.commanded_motion import CommandedRobot, RefusedCommands
 from hexacell.kinematics.corrections import NO_CORRECTIONS, CorrectionKind, Corrections
@@ -175,9 +176,11 @@ class Robot:
     def belief(self, identified: Identification | None = None) -> RobotBelief:
         """What is known of the robot: by an identification, or by its drawing alone."""
         prior = self.prior
-        free, covariance = prior.free, prior.covariance
+        free, covariance, terms = prior.free, prior.covariance, None
+        if identified is None and self.known_terms:
+            terms = TermEstimates.expected(self.known_terms, len(free))
         if identified is not None:
-            free, covariance = identified.free, identified.free_covariance
+            free, covariance, terms = identified.free, identified.free_covariance, identified.terms
         return RobotBelief(
             self.mechanism,
             self.commanding,
@@ -189,7 +192,7 @@ class Robot:
             self.frames.base[:, ["xyz".index(axis) for axis in self.work_frame]].T,
             self.refused,
             self.corrections,
-            None if identified is None else identified.terms,
+            terms,
         )
 
     def with_errors_of(self, settings: CellSettings) -> Robot:

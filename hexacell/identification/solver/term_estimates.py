@@ -58,6 +58,13 @@ class TermEstimates:
             spread @ crossed,
         )
 
+    @classmethod
+    def expected(cls, terms: tuple[ModelTerm, ...], parameters: int) -> TermEstimates:
+        """What is known of terms before records, beside a number of free parameters."""
+        spread = spread_of(terms)
+        mean = np.concatenate([term.mean for term in terms])
+        return cls(terms, mean, spread @ spread.T, np.zeros((len(mean), parameters)))
+
     def beside_encoders(self, directions: Array) -> Array:
         """How far joints (6,) stand from where encoders show them, by the side from which they came."""
         beside = np.zeros(LEGS)

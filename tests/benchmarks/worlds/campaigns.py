@@ -9,11 +9,13 @@ from hexacell.campaign.forecast import select_sets
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.loader import Cell
 from hexacell.design.candidates import orientations, reachable
+from hexacell.identification.solver.term_estimates import TermEstimates
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.model import Robot, robot_of
 from tests.benchmarks.machines import bundled, truth_of
+from tests.benchmarks.worlds.not_geometry import terms_of
 from tests.benchmarks.worlds.world import Commands
 
 TILT_DEG = 45.0
@@ -58,8 +60,13 @@ class Setting:
 
 
 @lru_cache
-def setting(number: int) -> Setting:
+def setting(number: int, candidates: int = 64, terms: tuple[str, ...] = ()) -> Setting:
     """The robot of Table 1 is number 0; others are drawn within the tolerances.
+
+    Args:
+        number: of the robot.
+        candidates: from so many orientations poses are chosen.
+        terms: what of it is not geometry; poses are chosen for these terms beside the geometry.
 
     Raises:
         UnreachableError: it cannot take the poses; try the next number.
@@ -74,13 +81,15 @@ def setting(number: int) -> Setting:
     truth = truth_of(cell, robot, number)
     limits = replace(robot.limits, singularity_margin=MARGIN)
     free = robot.mechanism.convention.free_parameters(truth)
-    belief = replace(robot.belief(), free=free, limits=limits)
+    has = tuple(term for term in terms_of(robot) if term.name in terms)
+    known = TermEstimates.expected(has, len(free)) if has else None
+    belief = replace(robot.belief(), free=free, limits=limits, terms=known)
     points = robot.frames.poses(
         PoseBatch.of(Pose(*point) for point in cell.settings.identification.points)
     ).positions
     random = np.random.default_rng([17, number])
     parts, labels = [], []
-    for point, chosen in enumerate(select_sets(belief, points, RECORDS + 4, 1, 64), start=1):
+    for point, chosen in enumerate(select_sets(belief, points, RECORDS + 4, 1, candidates), start=1):
         aimed = chosen.positions + random.uniform(-AIM_MM, AIM_MM, chosen.positions.shape)
         _, commands = reachable(belief, PoseBatch(aimed, chosen.rotations))
         if len(commands) < RECORDS:

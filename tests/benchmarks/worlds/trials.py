@@ -99,13 +99,13 @@ def world_of(trial: Trial) -> tuple[World, Setting]:
 
 
 @cache
-def settings() -> tuple[Setting, ...]:
-    """Of the first robots that can take the poses of a campaign."""
+def settings(candidates: int = 64, terms: tuple[str, ...] = ()) -> tuple[Setting, ...]:
+    """Of the first robots that can take the poses of a campaign; arguments as of :func:`.setting`."""
     found: list[Setting] = []
     number = 0
     while len(found) < ROBOTS:
         with suppress(UnreachableError):
-            found.append(setting(number))
+            found.append(setting(number, candidates, terms))
         number += 1
     return tuple(found)
 

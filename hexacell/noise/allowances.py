@@ -20,6 +20,7 @@ from hexacell.design.predicted_records import CHANCE_SIGMAS
 from hexacell.distributions import normal_probability, student_limit
 from hexacell.errors import LimitError
 from hexacell.identification.solver.result import Identification
+from hexacell.identification.solver.term_estimates import TermEstimates
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
@@ -55,6 +56,11 @@ class Allowances:
     robot: Robot
     is_measured: bool = False
     found: Identification | None = None
+
+    @cached_property
+    def terms(self) -> TermEstimates | None:
+        """What is known beside the geometry, by this run or, in a check, by the calibration before it."""
+        return self.robot.belief(self.found).terms
 
     @property
     def stops(self) -> float:

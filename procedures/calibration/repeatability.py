@@ -28,12 +28,12 @@ BACKLASH = str(CorrectionKind.BACKLASH)
 
 
 def noise_readings(
-    measured: SetState, encoders: EncoderSettings, *, windows: int = 1, allowances: Allowances | None = None
+    measured: SetState, encoders: EncoderSettings, allowances: Allowances, *, windows: int = 1
 ) -> NoiseReadings:
     """What was read at the reference of a set.
 
     Its record is no visit like the others if it is the mean of more ``windows``. What the gauges showed is
-    without the backlash that was found by the ``allowances``.
+    without the backlash that the ``allowances`` know.
     """
     zero, series = measured.samples[0], measured.standstill
     gauges = [] if series is None else series.gauges_mm
@@ -52,19 +52,17 @@ def noise_readings(
     )
 
 
-def _is_comparable(reading: Reading, allowances: Allowances | None) -> bool:
+def _is_comparable(reading: Reading, allowances: Allowances) -> bool:
     """Whether it is known where the joints stood: with backlash, from which side each had arrived."""
-    found = None if allowances is None or allowances.found is None else allowances.found.terms
-    terms = () if found is None else found.terms
+    terms = () if allowances.terms is None else allowances.terms.terms
     return all(reading.directions) or not any(term.needs_directions for term in terms)
 
 
-def _gauges_and_joints(reading: Reading, reference: Pose, allowances: Allowances | None) -> Array:
+def _gauges_and_joints(reading: Reading, reference: Pose, allowances: Allowances) -> Array:
     """What gauges, mm, and encoders showed at a reference (9,), without what backlash did to the gauges."""
     gauges = np.array(reading.gauges_mm)
-    found = None if allowances is None or allowances.found is None else allowances.found.terms
-    if allowances is not None and found is not None and reading.directions:
-        beside = found.beside_encoders(np.array(reading.directions))
+    if allowances.terms is not None and reading.directions:
+        beside = allowances.terms.beside_encoders(np.array(reading.directions))
         gauges = gauges - allowances.ball_at(reference).motion(beside)
     return np.array([*gauges, *reading.joints])
 
@@ -104,7 +102,7 @@ def _visits(plan: Plan, state: RunState, allowances: Allowances) -> NoiseReading
     if visited is None or not visited.samples or len(visited.visits) < plan.settings.noise.revisits:
         return None
     windows = state.noise.noise.windows
-    return noise_readings(visited, plan.settings.encoders, windows=windows, allowances=allowances)
+    return noise_readings(visited, plan.settings.encoders, allowances, windows=windows)
 
 
 def reversal_by_repeats(plan: Plan, state: RunState, found: Identification) -> Reversal | None:

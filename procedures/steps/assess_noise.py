@@ -38,7 +38,8 @@ class AssessNoise(Computation):
     def compute(self, run: RunResources, state: RunState) -> NoiseMeasured:
         assert state.at_pose is not None  # noqa: S101 - decided only at the reference
         key, _ = state.at_pose
-        readings = noise_readings(state.set(key), run.settings.encoders)
+        before = run.calibration.known(state).allowances
+        readings = noise_readings(state.set(key), run.settings.encoders, before)
         measured = NoiseMeasured(at=key, noise=assess_noise(run.calibration.plan, readings))
         known = run.calibration.known(measured.applied_to(state))
         known.allowances.require_travel(readings.reference)

@@ -13,6 +13,7 @@ from hexacell.campaign.decisions import FIRST_PILOT, FinishPoint, MeasurePose, S
 from hexacell.campaign.planner import Plan
 from hexacell.errors import HexacellError
 from hexacell.kinematics.rotations import Array
+from hexacell.noise.allowances import Allowances
 from hexacell.noise.noise_assessment import visits_agree
 from procedures.calibration.calibration import campaign_state
 from procedures.calibration.repeatability import noise_readings
@@ -74,7 +75,8 @@ class NoiseSteps:
 
         A robot that shows other places each time it is at one is not known by what it shows.
         """
-        visits = noise_readings(state.set(key), self.plan.settings.encoders)
+        allowances = Allowances(self.plan.settings, self.plan.robot)
+        visits = noise_readings(state.set(key), self.plan.settings.encoders, allowances)
         if not visits_agree(self.plan.cautious, visits):
             return None
         pilot = self.plan.pilot_pose(campaign_state(state, key))

@@ -1,8 +1,8 @@
 """Machines with backlash, play and compliance: identified and corrected they are as good as without.
 
-The bundled robot, 5 x 11 records, other equations (:mod:`tests.benchmarks.worlds`). Poses are chosen for what
-the machine has, as a run does that finds it. A controller corrects what was found, as the identification has
-it; U and verdict are those of a run.
+The bundled robot, 5 x 11 records, other equations (:mod:`tests.benchmarks.worlds`). Poses are chosen for
+what the machine has, as a run does that finds it. A controller corrects what was found, as the
+identification has it; U and verdict are those of a run.
 """
 
 from dataclasses import dataclass, replace

@@ -237,12 +237,20 @@ class Plan:
         )
 
     def information_per_record(self, belief: RobotBelief) -> Array:
-        """The information (p, p), 1/mm^2, of a record of the planned sets on average."""
+        """The information (p, p), 1/mm^2, of a record of the planned sets on average.
+
+        Beside what is known of terms, whose coefficients take their part of it.
+        """
         information = PlannedInformation.of(self.planned_sets, belief)
         sizes = {point: len(self.planned_sets[point - 1]) for point in self.points}
         total = np.sum([information.information(point, size) for point, size in sizes.items()], axis=0)
         mean: Array = total / sum(sizes.values())
-        return mean
+        if belief.terms is None:
+            return mean
+        free = len(belief.free)
+        of_terms = mean[free:, free:] + np.linalg.inv(belief.terms.covariance)
+        taken: Array = mean[:free, free:] @ np.linalg.solve(of_terms, mean[free:, :free])
+        return mean[:free, :free] - taken
 
     @cached_property
     def forecaster(self) -> Forecaster:

@@ -55,16 +55,25 @@ def noise_readings(
 def _is_comparable(reading: Reading, allowances: Allowances) -> bool:
     """Whether it is known where the joints stood: with backlash, from which side each had arrived."""
     terms = () if allowances.terms is None else allowances.terms.terms
-    return all(reading.directions) or not any(term.needs_directions for term in terms)
+    matters = any(term.needs_directions for term in terms) or any(allowances.robot.corrections.backlash)
+    return all(reading.directions) or not matters
 
 
 def _gauges_and_joints(reading: Reading, reference: Pose, allowances: Allowances) -> Array:
-    """What gauges, mm, and encoders showed at a reference (9,), without what backlash did to the gauges."""
-    gauges = np.array(reading.gauges_mm)
-    if allowances.terms is not None and reading.directions:
-        beside = allowances.terms.beside_encoders(np.array(reading.directions))
-        gauges = gauges - allowances.ball_at(reference).motion(beside)
-    return np.array([*gauges, *reading.joints])
+    """What gauges, mm, and encoders showed at a reference (9,), without what backlash did to either.
+
+    A controller that corrects it sends joints further, which the encoders show. While nothing is known of
+    the backlash itself, it is what the controller corrects.
+    """
+    gauges, joints = np.array(reading.gauges_mm), np.array(reading.joints)
+    if reading.directions:
+        directions = np.array(reading.directions)
+        further = 0.5 * np.array(allowances.robot.corrections.backlash) * directions
+        joints = joints - further
+        if allowances.terms is not None:
+            beside = allowances.terms.beside_encoders(directions)
+            gauges = gauges - allowances.ball_at(reference).motion(beside + further)
+    return np.array([*gauges, *joints])
 
 
 def since_zero(allowances: Allowances, measured: SetState, now: Reading) -> ReferenceChange:

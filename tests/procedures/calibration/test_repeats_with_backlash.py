@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from hexacell.identification.estimator import identify
+from hexacell.kinematics.corrections import Corrections
 from hexacell.kinematics.pose import Pose
 from hexacell.noise.allowances import SIGMAS, Allowances
 from procedures.calibration.repeatability import since_zero
@@ -61,3 +62,22 @@ def test_few_visits_leave_room_for_a_larger_scatter(allowances: Allowances) -> N
     assert measured.stop_sigmas > 1.15 * SIGMAS
     assert replace(measured, is_measured=False).stop_sigmas == SIGMAS
     assert measured.following == pytest.approx(measured.stop_sigmas * 0.3)
+
+
+def test_a_controller_that_corrects_backlash_does_not_scatter(allowances: Allowances) -> None:
+    """Its encoders show the way that it makes up for, the ball stays: known from a calibration before."""
+    assert allowances.found is not None
+    assert allowances.found.terms is not None
+    [term] = allowances.found.terms.terms
+    lost = term.identified_as(*allowances.found.terms.of("backlash"))
+    corrected = Corrections(backlash=tuple(BACKLASH.tolist()))
+    checked = replace(allowances.robot, known_terms=(lost,), corrections=corrected)
+    knows = replace(allowances, robot=checked, found=None)
+    reference = Pose(*allowances.settings.identification.points[0])
+    zero = reading(np.zeros(3), 0.5 * BACKLASH * FROM_BELOW, FROM_BELOW)
+    now = reading(np.zeros(3), 0.5 * BACKLASH * FROM_BOTH_SIDES, FROM_BOTH_SIDES)
+    at_zero = SimpleNamespace(samples=[SimpleNamespace(reading=zero, pose=reference.as_tuple())])
+    change = since_zero(knows, at_zero, now)  # type: ignore[arg-type]
+    assert change.joints == pytest.approx(np.zeros(6), abs=1e-9)
+    by_encoders = np.linalg.norm(knows.ball_at(reference).motion(now.joints))
+    assert np.abs(change.unexplained_mm).max() < 0.3 * by_encoders

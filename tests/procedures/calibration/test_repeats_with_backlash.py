@@ -79,5 +79,5 @@ def test_a_controller_that_corrects_backlash_does_not_scatter(allowances: Allowa
     at_zero = SimpleNamespace(samples=[SimpleNamespace(reading=zero, pose=reference.as_tuple())])
     change = since_zero(knows, at_zero, now)  # type: ignore[arg-type]
     assert change.joints == pytest.approx(np.zeros(6), abs=1e-9)
-    by_encoders = np.linalg.norm(knows.ball_at(reference).motion(now.joints))
+    by_encoders = np.linalg.norm(knows.ball_at(reference).motion(np.array(now.joints)))
     assert np.abs(change.unexplained_mm).max() < 0.3 * by_encoders

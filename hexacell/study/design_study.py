@@ -54,12 +54,6 @@ class DesignTrial:
     noise_mm: float = 0.01
     points: int = 5
 
-    @property
-    def key(self) -> str:
-        """The name of this trial alone."""
-        limits = f"{self.travel_mm:g} mm, {self.tilt_deg:g} deg, noise {self.noise_mm:g} mm"
-        return f"{self.choice}, {limits}, {self.points} points, {self.number}"
-
 
 @dataclass(frozen=True, slots=True)
 class RecordsAccuracy:
@@ -218,26 +212,26 @@ class DesignStudy:
     noise_ratio: Mapping[str, float]
 
 
-def design_trials_of(robots: int) -> dict[str, DesignTrial]:
-    """All trials by their keys."""
+def design_trials_of(robots: int) -> list[DesignTrial]:
+    """All trials; the usual ones of a sweep are those of the comparison."""
     trials = [DesignTrial(number, choice) for number in range(robots) for choice in OrientationChoice]
     trials += [trial for name in SWEEPS for trials in _swept(name, robots).values() for trial in trials]
-    return {trial.key: trial for trial in trials}
+    return list(dict.fromkeys(trials))
 
 
 def _swept(name: str, robots: int) -> dict[float, list[DesignTrial]]:
-    """The trials of a sweep by the value; the usual ones are those of the comparison."""
+    """The trials of a sweep by the value."""
     field, values = SWEEPS[name]
     usual = [DesignTrial(number) for number in range(min(robots, SWEPT))]
     varied: dict[float, dict[str, Any]] = {float(value): {field: value} for value in values}
     return {value: [replace(trial, **change) for trial in usual] for value, change in varied.items()}
 
 
-def design_summary(trials: Mapping[str, DesignTrial], outcomes: Mapping[str, DesignOutcome]) -> DesignStudy:
-    """The figures of trials and their outcomes, by their keys."""
-    robots = sum(one == DesignTrial(one.number) for one in trials.values())
+def design_summary(outcomes: Mapping[DesignTrial, DesignOutcome]) -> DesignStudy:
+    """The figures of all outcomes, by their trials."""
+    robots = sum(one == DesignTrial(one.number) for one in outcomes)
     compared = {
-        choice: [outcomes[DesignTrial(number, choice).key] for number in range(robots)]
+        choice: [outcomes[DesignTrial(number, choice)] for number in range(robots)]
         for choice in OrientationChoice
     }
     adaptive = compared[OrientationChoice.ADAPTIVE]
@@ -246,7 +240,7 @@ def design_summary(trials: Mapping[str, DesignTrial], outcomes: Mapping[str, Des
         {choice.value: _curve(found) for choice, found in compared.items()},
         {
             name: {
-                value: Spread.of([last for one in swept if (last := outcomes[one.key].last)])
+                value: Spread.of([last for one in swept if (last := outcomes[one].last)])
                 for value, swept in _swept(name, robots).items()
             }
             for name in SWEEPS

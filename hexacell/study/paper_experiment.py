@@ -54,11 +54,6 @@ class Experiment:
     repeatability_mm: float
     number: int
 
-    @property
-    def key(self) -> str:
-        """The name of this experiment alone."""
-        return f"{self.repeatability_mm:g} mm, {self.number}"
-
 
 @dataclass(frozen=True, slots=True)
 class Differences:
@@ -188,19 +183,16 @@ class ExperimentStudy:
     example: ExperimentOutcome
 
 
-def experiments_of(draws: int) -> dict[str, Experiment]:
-    """All experiments of the study by their keys, each repeatability with so many draws."""
-    every = [Experiment(mm, number) for mm in REPEATABILITIES_MM for number in range(draws)]
-    return {one.key: one for one in every}
+def experiments_of(draws: int) -> list[Experiment]:
+    """All experiments of the study, each repeatability with so many draws."""
+    return [Experiment(mm, number) for mm in REPEATABILITIES_MM for number in range(draws)]
 
 
-def experiment_summary(
-    experiments: Mapping[str, Experiment], outcomes: Mapping[str, ExperimentOutcome]
-) -> ExperimentStudy:
-    """The figures of experiments and their outcomes, by their keys."""
+def experiment_summary(outcomes: Mapping[Experiment, ExperimentOutcome]) -> ExperimentStudy:
+    """The figures of all outcomes, by their experiments."""
     rows = []
     for mm in REPEATABILITIES_MM:
-        found = [outcomes[key] for key, one in experiments.items() if one.repeatability_mm == mm]
+        found = [outcome for one, outcome in outcomes.items() if one.repeatability_mm == mm]
         rows.append(
             RepeatabilityRow(
                 mm,
@@ -211,7 +203,7 @@ def experiment_summary(
                 MEAN_DISTANCE * mm,
             )
         )
-    return ExperimentStudy(tuple(rows), outcomes[Experiment(PAPER_REPEATABILITY_MM, 0).key])
+    return ExperimentStudy(tuple(rows), outcomes[Experiment(PAPER_REPEATABILITY_MM, 0)])
 
 
 EXPERIMENT = Study(

@@ -83,12 +83,6 @@ class Trial:
     amplitude_deg: float = 30.0
     angles: Angles = Angles.FIXED_AXES
 
-    @property
-    def key(self) -> str:
-        """The name of this trial alone."""
-        kind = f"{self.angles}, {self.amplitude_deg:g} deg"
-        return f"{self.points} x {self.orientations}, {kind}, {self.number}"
-
 
 @dataclass(frozen=True, slots=True)
 class Errors:
@@ -256,23 +250,22 @@ Kind = tuple[int, int, float, Angles]
 """Points, orientations, amplitude in deg, and what the angles mean."""
 
 
-def trials_of(draws: int) -> dict[str, Trial]:
-    """All trials of the study by their keys, each kind with so many draws."""
+def trials_of(draws: int) -> list[Trial]:
+    """All trials of the study, each kind with so many draws."""
     kinds = [*(one for figure in FIGURES for one in _figure_kinds(figure)), *_sweep_kinds()]
-    trials = [
+    return [
         Trial(points, count, number, amplitude, angles)
         for points, count, amplitude, angles in kinds
         for number in range(draws)
     ]
-    return {trial.key: trial for trial in trials}
 
 
-def summary(trials: Mapping[str, Trial], outcomes: Mapping[str, Outcome]) -> PaperStudy:
-    """The figures of trials and their outcomes, by their keys."""
+def summary(outcomes: Mapping[Trial, Outcome]) -> PaperStudy:
+    """The figures of all outcomes, by their trials."""
     found: dict[Kind, list[Outcome]] = {}
-    for key, one in trials.items():
+    for one, outcome in outcomes.items():
         kind = one.points, one.orientations, one.amplitude_deg, one.angles
-        found.setdefault(kind, []).append(outcomes[key])
+        found.setdefault(kind, []).append(outcome)
     most = [one.noisy for one in found[_figure_kinds(4)[-1]]]
     return PaperStudy(
         {figure: tuple(_set(one, found[one]) for one in _figure_kinds(figure)) for figure in FIGURES},

@@ -6,8 +6,8 @@ had begun is done again; only a task that has ended its worker several times is 
 
 import os
 import signal
-from collections.abc import Callable, Collection, Iterator, Mapping
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from functools import partial
 from multiprocessing import get_context
@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from hexacell.errors import FileError, HexacellError
 from hexacell.storage import atomic_files
 
-TaskType = TypeVar("TaskType")
+TaskType = TypeVar("TaskType", bound=Hashable)
 ResultType = TypeVar("ResultType")
 SummaryType = TypeVar("SummaryType")
 
@@ -39,18 +39,18 @@ class Study(Generic[TaskType, ResultType, SummaryType]):
     Attributes:
         name: name of its command and its files.
         unit: word for its tasks, in the plural.
-        tasks_of: all tasks by their keys, for a number of draws. Each has its own seed.
+        tasks_of: all tasks, dataclasses that can be hashed, for a number of draws. Each has its own seed.
         carry_out: a task's result; a function of a module, since other processes import it.
         result_type: class of the results, a dataclass, which is kept as JSON.
-        summary: gives the summary of all tasks and their results, by the same keys.
+        summary: gives the summary of all results, by their tasks.
     """
 
     name: str
     unit: str
-    tasks_of: Callable[[int], Mapping[str, TaskType]]
+    tasks_of: Callable[[int], Iterable[TaskType]]
     carry_out: Callable[[TaskType], ResultType]
     result_type: type[ResultType]
-    summary: Callable[[Mapping[str, TaskType], Mapping[str, ResultType]], SummaryType]
+    summary: Callable[[Mapping[TaskType, ResultType]], SummaryType]
 
 
 class WorkersLost(HexacellError):
@@ -58,25 +58,20 @@ class WorkersLost(HexacellError):
 
 
 def results_of(
-    tasks: Mapping[str, TaskType],
-    carry_out: Callable[[TaskType], ResultType],
-    new_executor: NewExecutor,
-    *,
-    done: Collection[str] = (),
-) -> Iterator[tuple[str, ResultType]]:
-    """Each task's key and result as they come, without those that are done already.
+    tasks: Iterable[TaskType], carry_out: Callable[[TaskType], ResultType], new_executor: NewExecutor
+) -> Iterator[tuple[TaskType, ResultType]]:
+    """Each task and its result as they come.
 
     Raises:
         WorkersLost: executors break one after the other.
         Exception: whatever a task raises.
     """
-    left = {key: task for key, task in tasks.items() if key not in done}
-    losses = 0
+    left, losses = dict.fromkeys(tasks), 0
     while left:
         count = len(left)
-        for key, result in _until_broken(left, carry_out, new_executor):
-            del left[key]
-            yield key, result
+        for task, result in _until_broken(left, carry_out, new_executor):
+            del left[task]
+            yield task, result
         losses = losses + 1 if len(left) == count else 0
         if losses == MOST_LOSSES:
             raise WorkersLost(
@@ -85,14 +80,13 @@ def results_of(
 
 
 def _until_broken(
-    left: Mapping[str, TaskType], carry_out: Callable[[TaskType], ResultType], new_executor: NewExecutor
-) -> Iterator[tuple[str, ResultType]]:
+    left: Iterable[TaskType], carry_out: Callable[[TaskType], ResultType], new_executor: NewExecutor
+) -> Iterator[tuple[TaskType, ResultType]]:
     executor = new_executor()
-    keys: dict[Future[ResultType], str] = {}
     try:
-        keys = {executor.submit(carry_out, task): key for key, task in left.items()}
-        for future in as_completed(keys):
-            yield keys[future], future.result()
+        begun = {executor.submit(carry_out, task): task for task in left}
+        for future in as_completed(begun):
+            yield begun[future], future.result()
     except BrokenExecutor:
         return
     finally:
@@ -126,19 +120,20 @@ def run_study(
         FileError: the folder cannot be written, or has another file of that name.
         WorkersLost: executors break one after the other.
     """
-    tasks = study.tasks_of(draws)
+    tasks = {repr(task): task for task in study.tasks_of(draws)}
     path = folder / f"{study.name}.jsonl"
     kept = TypeAdapter(cast("type[_Kept[ResultType]]", _Kept.__class_getitem__(study.result_type)))
     atomic_files.create_folder_durably(folder)
-    results = {key: result for key, result in _known(path, kept).items() if key in tasks}
+    results = {tasks[key]: result for key, result in _known(path, kept).items() if key in tasks}
     on_progress(len(results), len(tasks))
     with atomic_files.os_errors("cannot be written", path), path.open("a", encoding="utf-8") as file:
-        for key, result in results_of(tasks, study.carry_out, new_executor, done=set(results)):
-            results[key] = result
-            file.write(kept.dump_json(_Kept(key=key, outcome=result)).decode() + "\n")
+        left = [task for task in tasks.values() if task not in results]
+        for task, result in results_of(left, study.carry_out, new_executor):
+            results[task] = result
+            file.write(kept.dump_json(_Kept(key=repr(task), outcome=result)).decode() + "\n")
             file.flush()
             on_progress(len(results), len(tasks))
-    return study.summary(tasks, results)
+    return study.summary(results)
 
 
 def _known(path: Path, kept: TypeAdapter[_Kept[ResultType]]) -> dict[str, ResultType]:

@@ -18,12 +18,11 @@ LONGEST_S = 600.0
 PROCESSES = 2
 
 
-def tasks_of(robots: int) -> dict[str, DesignTrial]:
-    trials = [DesignTrial(number) for number in range(robots)]
-    return {trial.key: trial for trial in trials}
+def tasks_of(robots: int) -> list[DesignTrial]:
+    return [DesignTrial(number) for number in range(robots)]
 
 
-def every(_: Mapping[str, DesignTrial], outcomes: Mapping[str, DesignOutcome]) -> list[DesignOutcome]:
+def every(outcomes: Mapping[DesignTrial, DesignOutcome]) -> list[DesignOutcome]:
     return list(outcomes.values())
 
 

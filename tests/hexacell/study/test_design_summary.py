@@ -27,8 +27,7 @@ def outcome(trial: DesignTrial) -> DesignOutcome:
 
 
 def study(robots: int):
-    trials = design_trials_of(robots)
-    return design_summary(trials, {key: outcome(one) for key, one in trials.items()})
+    return design_summary({one: outcome(one) for one in design_trials_of(robots)})
 
 
 def test_each_figure_is_of_its_own_trials() -> None:
@@ -44,14 +43,13 @@ def test_each_figure_is_of_its_own_trials() -> None:
 
 
 def test_robots_that_are_not_identified_are_counted() -> None:
-    trials = design_trials_of(2)
-    outcomes = {key: outcome(one) for key, one in trials.items()}
+    outcomes = {one: outcome(one) for one in design_trials_of(2)}
     outcomes |= {
-        key: DesignOutcome(reason="out of reach")
-        for key, one in trials.items()
+        one: DesignOutcome(reason="out of reach")
+        for one in outcomes
         if one.number == 1 or one.choice is OrientationChoice.PAPER
     }
-    found = design_summary(trials, outcomes)
+    found = design_summary(outcomes)
     assert (found.choices["random"].tried, found.choices["random"].by_records[55].robots) == (2, 1)
     assert found.choices["paper"].by_records == {}
     assert isnan(found.noise_ratio["paper"])

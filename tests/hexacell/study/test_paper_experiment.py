@@ -36,15 +36,14 @@ def test_what_is_left_of_another_robot_is_its_repeatability() -> None:
 
 
 def test_all_of_it_is_of_its_own_experiments() -> None:
-    experiments = experiments_of(2)
     outcomes = {
-        key: ExperimentOutcome(
+        one: ExperimentOutcome(
             Differences((one.repeatability_mm,), (1.0,) if one.number else (), (0.1,), (0.1,)),
             Differences((10.0 * one.repeatability_mm,), (2.0,), (0.2,), (0.2,)),
         )
-        for key, one in experiments.items()
+        for one in experiments_of(2)
     }
-    study = experiment_summary(experiments, outcomes)
+    study = experiment_summary(outcomes)
     assert tuple(row.calibrating.before for row in study.rows) == REPEATABILITIES_MM
     assert {(row.draws, row.ended) for row in study.rows} == {(2, 1)}
     assert study.example.calibrating.before == (2.0,)

@@ -78,14 +78,13 @@ def test_after_some_steps_a_draw_that_came_to_its_end_before_counts_with_that() 
 
 
 def test_all_of_it_is_of_its_own_trials() -> None:
-    trials = trials_of(2)
     outcomes = {
-        key: Outcome(
+        one: Outcome(
             errors(one.points, one.amplitude_deg), errors(one.orientations, 0.1), 10.0 * one.points
         )
-        for key, one in trials.items()
+        for one in trials_of(2)
     }
-    study = summary(trials, outcomes)
+    study = summary(outcomes)
     assert [one.exact.paper_mm for one in study.figures[4]] == [1, 2, 3, 4, 5]
     assert {one.noisy.paper_mm for one in study.figures[5]} == {5}
     assert [one.deviation_mm for one in study.figures[5]] == [10, 20, 30, 40, 50]

@@ -131,34 +131,29 @@ class OnlineEstimator:
         return OnlineEstimate(self._robot.belief(found), found, self._last.false_records)
 
 
-@dataclass(frozen=True, slots=True)
-class SearchInVain:
-    """A search that found no plausible estimate: the cost that was to be explained, of how many records."""
-
-    cost: float
-    records: int
-
-    def is_outdated(self, present_cost: float, records: int) -> bool:
-        """Whether there is so much more to explain, or to explain it by, that another one may help."""
-        return present_cost >= COST_FACTOR * self.cost or records >= RECORDS_FACTOR * self.records
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class ChainedEstimate:
     """An estimate of the chain.
 
     Attributes:
         false_records: those that were found false and are left out.
-        in_vain: the last search, if it found no plausible estimate and this one is still implausible.
+        in_vain: the cost that the last search was to explain, and of how many records, if it found no
+            plausible estimate and this one is still implausible.
         terms: those beside the geometry that the robot is taken to have.
         terms_tried: of how many records they were chosen last.
     """
 
     identification: Identification
     false_records: frozenset[RecordId] = frozenset()
-    in_vain: SearchInVain | None = None
+    in_vain: tuple[float, int] | None = None
     terms: tuple[ModelTerm, ...] = ()
     terms_tried: int = 0
+
+    def may_be_searched(self, present_cost: float, records: int) -> bool:
+        """Whether there is so much more to explain, or to explain it by, that another search may help."""
+        if self.in_vain is None:
+            return True
+        return present_cost >= COST_FACTOR * self.in_vain[0] or records >= RECORDS_FACTOR * self.in_vain[1]
 
 
 def update_estimate(
@@ -202,7 +197,7 @@ def _following(
     """The estimate found from the ``kept`` records, or another one if that is implausible."""
     if not tries_others or _is_plausible(kept, found):
         return ChainedEstimate(found, before.false_records)
-    if before.in_vain is not None and not before.in_vain.is_outdated(cost(found), problem.records):
+    if not before.may_be_searched(cost(found), problem.records):
         return replace(before, identification=found)
     return _search(problem, _continued(problem, found) if before.false_records else found)
 
@@ -233,7 +228,7 @@ def _search(problem: Problem, found: Identification) -> ChainedEstimate:
         return clean
     # The best one may be of fewer records, and the cost of all of them is what there was to explain.
     unexplained = max(cost(found), cost(best))
-    return ChainedEstimate(best, in_vain=SearchInVain(unexplained, problem.records))
+    return ChainedEstimate(best, in_vain=(unexplained, problem.records))
 
 
 def _without_false_records(found: Identification) -> ChainedEstimate | None:

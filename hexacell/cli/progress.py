@@ -3,10 +3,8 @@
 import asyncio
 import os
 import sys
-from collections.abc import Callable, Coroutine, Iterator
-from contextlib import contextmanager
-from types import TracebackType
-from typing import Any, Self
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
 
 from rich.console import Console as RichConsole
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -104,39 +102,23 @@ def _bar() -> Progress:
     )
 
 
-class RunAnswers:
-    """Prints what the gauges show whenever a person at a plain terminal asks, without delaying the run.
+@asynccontextmanager
+async def gauges_on_request(
+    console: Console, watching: RunDeviceWatch
+) -> AsyncIterator[Callable[[], None]]:
+    """Gives what prints the gauges when a person at a plain terminal asks, without delaying the run."""
 
-    Used as ``async with``.
-    """
-
-    def __init__(self, console: Console, watching: RunDeviceWatch) -> None:
-        self._console, self._watching = console, watching
-        self._tasks: set[asyncio.Task[None]] = set()
-
-    async def __aenter__(self) -> Self:
-        self._begin(self._note_noise())
-        return self
-
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._watching.close()
-        for task in tuple(self._tasks):
-            await cancel_and_wait(task)
-
-    def print_gauges(self) -> None:
-        """Print what the gauges show, as soon as they are read."""
-        self._begin(self._print_fresh())
-
-    def _begin(self, work: Coroutine[Any, Any, None]) -> None:
-        task = asyncio.ensure_future(work)
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
-
-    async def _print_fresh(self) -> None:
-        self._console.print(gauges_text(await self._watching.fresh_snapshot()))
-
-    async def _note_noise(self) -> None:
-        async for _ in self._watching.snapshots():
+    async def note_noise() -> None:
+        async for _ in watching.snapshots():
             pass
+
+    async def print_fresh() -> None:
+        console.print(gauges_text(await watching.fresh_snapshot()))
+
+    tasks = [asyncio.ensure_future(note_noise())]
+    try:
+        yield lambda: tasks.append(asyncio.ensure_future(print_fresh()))
+    finally:
+        watching.close()
+        for task in tasks:
+            await cancel_and_wait(task)

@@ -11,7 +11,7 @@ from socket import socket
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.errors import ExitCode, HexacellError
 from hexacell.run_process import messages
-from hexacell.run_process.audience import STUCK_S, Audience, audience_server
+from hexacell.run_process.audience import Audience, audience_server
 from hexacell.run_process.live_devices import RunDeviceWatch
 from hexacell.services.run.calibration_run import RunRequest, calibrate
 from procedures.calibration.calibration import expected_records
@@ -52,28 +52,16 @@ class RunHost:
         queue: the commands of the engine.
         away_s: how long the run waits for a person while nobody is in control, s; by default as the cell
             file has it.
-        stuck_s: how long a client may take nothing, s.
     """
 
-    def __init__(
-        self,
-        request: RunRequest,
-        queue: CommandQueue,
-        *,
-        away_s: float | None = None,
-        stuck_s: float = STUCK_S,
-    ) -> None:
+    def __init__(self, request: RunRequest, queue: CommandQueue, *, away_s: float | None = None) -> None:
         settings = request.cell.settings
         self._watching = RunDeviceWatch(settings.gauges)
         self._request = request
         self._queue = queue
         self._away_s = 60.0 * settings.recovery.away_minutes if away_s is None else away_s
         self._audience = Audience(
-            self._opening,
-            on_command=self._queue.put,
-            on_control=self._on_control,
-            on_leave=self._on_leave,
-            stuck_s=stuck_s,
+            self._opening, on_command=self._queue.put, on_control=self._on_control, on_leave=self._on_leave
         )
         described = messages.RunDescribed(
             cell=settings.name,

@@ -15,8 +15,7 @@ from drivers.wire_trace import WireTrace
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.loader import Cell
 from hexacell.errors import HexacellError
-from hexacell.kinematics.parameters import JointUnit
-from hexacell.run_process.messages import ControllerSnapshot, EncoderSnapshot, GaugeSnapshot, LiveSnapshot
+from hexacell.run_process.messages import GaugeSnapshot, LiveSnapshot, Shown
 from hexacell.runs.cell_lock import cell_lock
 from hexacell.services.devices.device_setup import device_addresses, devices_of
 from procedures.devices.device_set import SAMPLE_PERIOD_S, Devices, LiveValue, LiveValues, poll_for_screens
@@ -61,22 +60,11 @@ class LiveFeed:
 
     def snapshot(self) -> LiveSnapshot:
         """The latest values of all devices."""
-        live, sample, status = self._live, self._live.encoders.value, self._live.controller.value
+        live, encoders, controller = self._live, self._live.encoders, self._live.controller
         return LiveSnapshot(
             gauges=tuple(map(self._gauge, self._gauges)),
-            encoders=EncoderSnapshot(
-                positions=None if sample is None else sample.positions,
-                unit=JointUnit.MM if sample is None else sample.unit,
-                age_s=_age(live.encoders),
-                problem=live.encoders.problem,
-            ),
-            controller=ControllerSnapshot(
-                estop=None if status is None else status.estop,
-                enabled=None if status is None else status.enabled,
-                error_messages=() if status is None else status.error_messages,
-                age_s=_age(live.controller),
-                problem=live.controller.problem,
-            ),
+            encoders=Shown(value=encoders.value, age_s=_age(encoders), problem=encoders.problem),
+            controller=Shown(value=controller.value, age_s=_age(controller), problem=controller.problem),
             stop_reason=live.stop_reason.value or live.stop_reason.problem,
         )
 

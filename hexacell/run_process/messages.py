@@ -8,19 +8,20 @@ screens, never for records.
 
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar, get_args
+from typing import Annotated, Any, Generic, Literal, TypeVar, get_args
 
 from pydantic import BeforeValidator, Field, PlainSerializer, TypeAdapter, ValidationError
 
+from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.cell.fields import Frozen, first_mistake
 from hexacell.errors import UsageError
-from hexacell.kinematics.parameters import JointUnit
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Command
 from procedures.run.questions import Question
 from procedures.steps.events import Event
 
 Message = TypeVar("Message")
+Value = TypeVar("Value")
 
 LONGEST_MESSAGE = 16 << 20
 """Bytes of one line; no message comes near it."""
@@ -43,8 +44,15 @@ def _command_in(value: object) -> object:
     return _COMMANDS[value["name"]].validate_python({k: v for k, v in value.items() if k != "name"})
 
 
-SnapshotAge = float | None
-"""How long ago a device answered, s; None before its first answer."""
+class Shown(Frozen, Generic[Value]):
+    """What a device showed last, how long ago, s, and why it did not answer since; empty if it did.
+
+    Value and age are None before its first answer.
+    """
+
+    value: Value | None = None
+    age_s: float | None = None
+    problem: str = ""
 
 
 class GaugeSnapshot(Frozen):
@@ -66,30 +74,11 @@ class GaugeSnapshot(Frozen):
     sign: Literal[1, -1] = 1
     shown_mm: float | None = None
     unit: Literal["mm"] = "mm"
-    age_s: SnapshotAge = None
+    age_s: float | None = None
     noise_mm: float | None = None
     problem: str = ""
     travel_mm: float
     middle_mm: float | None = None
-
-
-class EncoderSnapshot(Frozen):
-    """The six joint variables in their unit; None before the first answer."""
-
-    positions: tuple[float, ...] | None = None
-    unit: JointUnit = JointUnit.MM
-    age_s: SnapshotAge = None
-    problem: str = ""
-
-
-class ControllerSnapshot(Frozen):
-    """The state of the controller; ``estop`` and ``enabled`` are None before its first answer."""
-
-    estop: bool | None = None
-    enabled: bool | None = None
-    error_messages: tuple[str, ...] = ()
-    age_s: SnapshotAge = None
-    problem: str = ""
 
 
 class LiveSnapshot(Frozen):
@@ -100,8 +89,8 @@ class LiveSnapshot(Frozen):
 
     kind: Literal["live"] = "live"
     gauges: tuple[GaugeSnapshot, ...]
-    encoders: EncoderSnapshot = Field(default_factory=EncoderSnapshot)
-    controller: ControllerSnapshot = Field(default_factory=ControllerSnapshot)
+    encoders: Shown[EncoderSample] = Field(default_factory=Shown[EncoderSample])
+    controller: Shown[ControllerStatus] = Field(default_factory=Shown[ControllerStatus])
     stop_reason: str = ""
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from drivers.interfaces import DeviceIdentity
     from hexacell.dry_run.quick_level import QuickTrial
     from hexacell.results.run_comparison import ParameterTrend, RunComparison
+    from hexacell.runs.run_folder import RunFolder
     from hexacell.services.history.drift_history import DriftHistory, FoundChange
     from hexacell.services.history.past_runs import Retention
     from hexacell.services.history.run_index import PastRun, RunSummary
@@ -177,11 +178,12 @@ def _write_document(write: ConfigWrite) -> dict[str, Any]:
 
 def history_document(runs: Sequence[PastRun]) -> dict[str, Any]:
     """What ``history --json`` prints: the runs, the newest first."""
-    return {"runs": [_run_document(run) for run in runs]}
-
-
-def _run_document(run: PastRun) -> dict[str, Any]:
-    return {"run": run.folder.path, "in_controller": run.is_in_controller, **summary_document(run.summary)}
+    return {
+        "runs": [
+            {"run": one.folder.path, "in_controller": one.is_in_controller, **summary_document(one.summary)}
+            for one in runs
+        ]
+    }
 
 
 def summary_document(was: RunSummary) -> dict[str, Any]:
@@ -204,11 +206,11 @@ def summary_document(was: RunSummary) -> dict[str, Any]:
     }
 
 
-def comparison_document(before: PastRun, after: PastRun, compared: RunComparison) -> dict[str, Any]:
+def comparison_document(before: RunFolder, after: RunFolder, compared: RunComparison) -> dict[str, Any]:
     """What ``history --compare --json`` prints."""
     return {
-        "before": before.folder.path,
-        "after": after.folder.path,
+        "before": before.path,
+        "after": after.path,
         "frame": compared.frame,
         "changed": compared.is_changed,
         "chi2": compared.test.chi2,

@@ -11,6 +11,7 @@ from hexacell.text.layout import change_with_sigma, error_with_u, verdict_word, 
 
 if TYPE_CHECKING:
     from hexacell.results.run_comparison import ParameterTrend, RunComparison
+    from hexacell.runs.run_folder import RunFolder
     from hexacell.services.history.drift_history import DriftHistory, FoundChange
     from hexacell.services.history.past_runs import Retention
 
@@ -54,7 +55,7 @@ def standing(run: PastRun) -> str:
     return "replaced" if run.summary.has_written else ""
 
 
-def comparison_text(before: PastRun, after: PastRun, compared: RunComparison) -> str:
+def comparison_text(before: RunFolder, after: RunFolder, compared: RunComparison) -> str:
     """The verdict on the change in words, then every free parameter."""
     from hexacell.text.parameters import parameter_table, rows_of_changes  # noqa: PLC0415 - not for `status`
 

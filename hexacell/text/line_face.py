@@ -46,9 +46,9 @@ def record_text(record: events.RecordTaken) -> str:
 def gauges_text(snapshot: LiveSnapshot) -> str:
     """What the devices show now, a line each."""
     lines = [_gauge_text(gauge) for gauge in snapshot.gauges]
-    if snapshot.encoders.positions is not None:
-        positions = " ".join(f"{position:.3f}" for position in snapshot.encoders.positions)
-        lines.append(f"encoders: {positions} {snapshot.encoders.unit}")
+    if (sample := snapshot.encoders.value) is not None:
+        positions = " ".join(f"{position:.3f}" for position in sample.positions)
+        lines.append(f"encoders: {positions} {sample.unit}")
     if snapshot.stop_reason:
         lines.append(f"motion is forbidden: {snapshot.stop_reason}")
     return "\n".join(wrapped(line, indent=2) for line in lines)

@@ -6,13 +6,12 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.cell.loader import Cell
 from hexacell.dry_run.campaign import VisitedPose
 from hexacell.run_process.client import RunConnection
 from hexacell.run_process.messages import (
     ControlChanged,
-    ControllerSnapshot,
-    EncoderSnapshot,
     EventRecorded,
     GaugeSnapshot,
     HostMessage,
@@ -20,6 +19,7 @@ from hexacell.run_process.messages import (
     QuestionClosed,
     QuestionOpened,
     RunDescribed,
+    Shown,
     StatusChanged,
 )
 from hexacell.runs.run_folder import RunFolder
@@ -56,10 +56,10 @@ def snapshot(stop_reason: str = "", **changes: dict[str, object]) -> LiveSnapsho
     """All devices, working."""
     return LiveSnapshot(
         gauges=gauges(**changes),
-        encoders=EncoderSnapshot(
-            positions=(-120.4531, 14.2187, 88.0021, 301.7745, -45.1002, 210.6654), age_s=0.1
+        encoders=Shown(
+            value=EncoderSample((), (-120.4531, 14.2187, 88.0021, 301.7745, -45.1002, 210.6654)), age_s=0.1
         ),
-        controller=ControllerSnapshot(estop=False, enabled=True, age_s=0.2),
+        controller=Shown(value=ControllerStatus(estop=False, enabled=True), age_s=0.2),
         stop_reason=stop_reason,
     )
 

@@ -11,7 +11,7 @@ from hexacell.cell.loader import Cell
 from hexacell.cli.commands.cell import cell_with_devices_at
 from hexacell.cli.commands.unattended import begun_in_window, notified_afterwards
 from hexacell.cli.console import Console
-from hexacell.cli.progress import RunAnswers, RunProgress
+from hexacell.cli.progress import RunProgress, gauges_on_request
 from hexacell.cli.terminal import KeyboardCommands, SignalCommands, TerminalOperator, is_interactive
 from hexacell.errors import ExitCode, HexacellError, UsageError
 from hexacell.run_process.live_devices import RunDeviceWatch
@@ -168,13 +168,12 @@ async def _calibrate(
         with unattended_runs.ended_in_time(request, queue):
             return await calibrate(request, [*further, progress], queue)
     watching = RunDeviceWatch(request.cell.settings.gauges)
-    answers = RunAnswers(console, watching)
-    letters = {"g": answers.print_gauges, "s": progress.print_status}
-    keys = KeyboardCommands(console, queue.put, sys.stdin, letters)
-    request.operator.before_question, request.operator.after_question = progress.hide, keys.listen
-    request.operator.type_command = keys.take
-    console.print(LETTERS)
-    listeners: list[Listener] = [*further, progress, keys, watching.note]
-    run = calibrate(request, listeners, queue, watching.live, watching.follow)
-    async with answers:
+    async with gauges_on_request(console, watching) as print_gauges:
+        letters = {"g": print_gauges, "s": progress.print_status}
+        keys = KeyboardCommands(console, queue.put, sys.stdin, letters)
+        request.operator.before_question, request.operator.after_question = progress.hide, keys.listen
+        request.operator.type_command = keys.take
+        console.print(LETTERS)
+        listeners: list[Listener] = [*further, progress, keys, watching.note]
+        run = calibrate(request, listeners, queue, watching.live, watching.follow)
         return await keys.listen_during(run)

@@ -38,12 +38,11 @@ def past_runs(cell: Cell, index: RunIndex | None = None) -> tuple[PastRun, ...]:
     """
     config, folder = fingerprint(*cell.config_paths), runs_folder(cell)
     found = (index or RunIndex(cell)).documents(DocumentKind.SUMMARY, RunSummary, _summary)
-    runs = [_past_run(RunFolder(folder / name), summary, config) for name, summary in found.items()]
+    runs = [
+        PastRun(RunFolder(folder / name), summary, summary.written_sha256 == config)
+        for name, summary in found.items()
+    ]
     return tuple(sorted(runs, key=_age_rank, reverse=True))
-
-
-def _past_run(folder: RunFolder, summary: RunSummary, config_sha256: str) -> PastRun:
-    return PastRun(folder, summary, summary.written_sha256 == config_sha256)
 
 
 def _summary(folder: RunFolder) -> RunSummary:
@@ -52,20 +51,17 @@ def _summary(folder: RunFolder) -> RunSummary:
     return run_summary(folder)
 
 
-def compare_runs(cell: Cell, before: str, after: str) -> tuple[PastRun, PastRun, RunComparison]:
+def compare_runs(cell: Cell, before: str, after: str) -> tuple[RunFolder, RunFolder, RunComparison]:
     """Two runs, by folder or name, and what changed from one to the other.
 
     Raises:
         UsageError: there is no such run, it identified nothing, or their frames differ.
-        FileError: the controller's config cannot be read.
     """
     from hexacell.results.run_comparison import compare_results  # noqa: PLC0415 - only where runs are compared
-    from hexacell.services.history.run_summary import require_result, run_summary, state_of  # noqa: PLC0415
+    from hexacell.services.history.run_summary import require_result, state_of  # noqa: PLC0415
 
-    config = fingerprint(*cell.config_paths)
-    folders = (find_run(cell, named) for named in (before, after))
-    one, other = (_past_run(folder, run_summary(folder), config) for folder in folders)
-    results = (require_result(state_of(run.folder), run.name) for run in (one, other))
+    one, other = (find_run(cell, named) for named in (before, after))
+    results = (require_result(state_of(run), run.name) for run in (one, other))
     return one, other, compare_results(cell.settings.mechanism.parameters, *results)
 
 

@@ -5,10 +5,11 @@ In the list of planned poses a key excludes what the robot must not be sent to.
 
 from collections.abc import Iterator, Sequence
 
+from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.cell.model import CellSettings
 from hexacell.dry_run.campaign import VisitedPose
 from hexacell.errors import HexacellError, flatten_errors
-from hexacell.run_process.messages import ControllerSnapshot, EncoderSnapshot, GaugeSnapshot, LiveSnapshot
+from hexacell.run_process.messages import GaugeSnapshot, LiveSnapshot, Shown
 from hexacell.text.screens.views import ChecklistItem, Line, Mark, Urgency
 from procedures.run.keys import ThreeNumbers
 
@@ -153,27 +154,25 @@ def age_text(age_s: float | None, later_s: float) -> str:
     return f"{age:.1f} s" if age < 99.95 else "> 99 s"
 
 
-def _encoder_line(encoders: EncoderSnapshot, later_s: float) -> Line:
+def _encoder_line(encoders: Shown[EncoderSample], later_s: float) -> Line:
     text = encoders.problem or "no reading yet"
-    if not encoders.problem and encoders.positions is not None:
-        positions = " ".join(f"{one:+9.3f}" for one in encoders.positions)
+    if not encoders.problem and (sample := encoders.value) is not None:
+        positions = " ".join(f"{one:+9.3f}" for one in sample.positions)
         is_silent = encoders.age_s is None or encoders.age_s + later_s > OLD_S
         age = f", {age_text(encoders.age_s, later_s)} ago" if is_silent else ""
-        text = f"{positions} {encoders.unit}{age}"
+        text = f"{positions} {sample.unit}{age}"
     return f"{'encoders':11}{text}", urgency_of(encoders.problem)
 
 
-def _controller_line(controller: ControllerSnapshot, later_s: float) -> Line:
+def _controller_line(controller: Shown[ControllerStatus], later_s: float) -> Line:
     """Whether the controller may move."""
-    said = "".join(f"; {message}" for message in controller.error_messages)
-    text, urgency = f"EMERGENCY STOP{said}", Urgency.ALARM
-    if controller.problem:
-        text = controller.problem
-    elif controller.estop is None:
-        text, urgency = "no answer yet", Urgency.CALM
-    elif not controller.estop:
-        state = "on, may move" if controller.enabled else "off"
-        text, urgency = f"{state}, {age_text(controller.age_s, later_s)} ago{said}", Urgency.CALM
+    text, urgency = controller.problem or "no answer yet", urgency_of(controller.problem)
+    if not controller.problem and (status := controller.value) is not None:
+        said = "".join(f"; {message}" for message in status.error_messages)
+        state = "on, may move" if status.enabled else "off"
+        text = f"{state}, {age_text(controller.age_s, later_s)} ago{said}"
+        if status.estop:
+            text, urgency = f"EMERGENCY STOP{said}", Urgency.ALARM
     return f"{'controller':11}{text}", urgency
 
 
@@ -185,10 +184,12 @@ def live_items(live: LiveSnapshot | None) -> tuple[ChecklistItem, ...]:
         _device(f"gauge {one.name}", one.problem, "" if one.shown_mm is None else f"{one.shown_mm:+.3f} mm")
         for one in live.gauges
     ]
-    found = "" if live.encoders.positions is None else "six positions"
+    found = "" if live.encoders.value is None else "six positions"
     encoders = _device("encoders", live.encoders.problem, found)
-    answer = {None: "", True: "answers; in emergency stop, asked about at the start", False: "answers"}
-    controller = _device("controller", live.controller.problem, answer[live.controller.estop])
+    status = live.controller.value
+    stopped = "; in emergency stop, asked about at the start" if status and status.estop else ""
+    answer = "" if status is None else f"answers{stopped}"
+    controller = _device("controller", live.controller.problem, answer)
     stop = ChecklistItem(Mark.DONE, "stop line", "motion is allowed")
     if live.stop_reason:
         stop = ChecklistItem(Mark.FAILED, "stop line", live.stop_reason, "Release it")

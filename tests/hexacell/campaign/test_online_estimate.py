@@ -1,17 +1,12 @@
 """The chain of estimates: false records are left out; computed again it gives the same."""
 
 from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from hexacell.campaign.online_estimate import (
-    ChainedEstimate,
-    OnlineEstimator,
-    SearchInVain,
-    cost,
-    update_estimate,
-)
+from hexacell.campaign.online_estimate import ChainedEstimate, OnlineEstimator, cost, update_estimate
 from hexacell.errors import LimitError
 from hexacell.identification.estimator import estimate_online
 from hexacell.measurements.records import MeasurementSet
@@ -83,7 +78,9 @@ def test_a_robot_near_its_prior_keeps_all_records(noisy, chain):
     [(100.0, 20, False), (199.0, 29, False), (200.0, 20, True), (100.0, 30, True), (10.0, 10, False)],
 )
 def test_a_search_is_repeated_for_twice_the_cost_or_half_as_many_records_again(cost, records, outdated):
-    assert SearchInVain(cost=100.0, records=20).is_outdated(cost, records) is outdated
+    assert (
+        ChainedEstimate(cast("Any", None), in_vain=(100.0, 20)).may_be_searched(cost, records) is outdated
+    )
 
 
 @pytest.fixture

@@ -41,7 +41,7 @@ async def test_before_the_first_answer_nothing_is_shown(feed) -> None:
     assert (gauge.name, gauge.axis, gauge.sign, gauge.travel_mm, gauge.middle_mm) == (
         "left", "y", -1, 10.0, 5.0,
     )  # fmt: skip
-    assert (snapshot.encoders.positions, snapshot.controller.estop) == (None, None)
+    assert (snapshot.encoders.value, snapshot.controller.value) == (None, None)
 
 
 async def test_each_device_has_its_value_and_age(feed, live, clock) -> None:
@@ -62,10 +62,12 @@ async def test_each_device_has_its_value_and_age(feed, live, clock) -> None:
     await live.stop_reason.of(forbidden)
     snapshot = feed.snapshot()
     assert (snapshot.gauges[0].shown_mm, snapshot.gauges[0].age_s) == (1.25, 3.0)
-    assert (snapshot.encoders.positions, snapshot.encoders.age_s) == ((0.5,) * 6, 3.0)
-    controller = snapshot.controller
+    assert snapshot.encoders.value is not None
+    assert (snapshot.encoders.value.positions, snapshot.encoders.age_s) == ((0.5,) * 6, 3.0)
+    controller = snapshot.controller.value
+    assert controller is not None
     assert (controller.estop, controller.enabled, controller.error_messages) == (True, False, ("joint 3",))
-    assert (controller.age_s, snapshot.stop_reason) == (0.0, "the stop file is there")
+    assert (snapshot.controller.age_s, snapshot.stop_reason) == (0.0, "the stop file is there")
 
 
 async def test_a_failure_is_shown_with_the_last_value(feed, live) -> None:

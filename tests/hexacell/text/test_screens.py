@@ -3,13 +3,12 @@
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.checks.check_result import CheckResult, ParameterChange
 from hexacell.kinematics.pose import Pose
 from hexacell.run_process.messages import (
     ControlChanged,
-    ControllerSnapshot,
-    EncoderSnapshot,
     EventRecorded,
     GaugeSnapshot,
     HostFailed,
@@ -17,6 +16,7 @@ from hexacell.run_process.messages import (
     LiveSnapshot,
     QuestionOpened,
     RunDescribed,
+    Shown,
     StatusChanged,
 )
 from hexacell.text.parameters import parameter_table, rows_of_run
@@ -75,7 +75,9 @@ def test_a_gauge_says_how_it_is_to_be_moved() -> None:
 
 
 def test_a_device_that_is_silent_gets_older_by_itself() -> None:
-    snapshot = LiveSnapshot(gauges=(gauge(),), encoders=EncoderSnapshot(positions=(0.0,) * 6, age_s=0.1))
+    snapshot = LiveSnapshot(
+        gauges=(gauge(),), encoders=Shown(value=EncoderSample((), (0.0,) * 6), age_s=0.1)
+    )
     assert "0.1 s" in device_lines(snapshot)[0][0]
     lines = device_lines(snapshot, later_s=7.0)
     assert "7.1 s" in lines[0][0]
@@ -85,8 +87,8 @@ def test_a_device_that_is_silent_gets_older_by_itself() -> None:
 def test_what_is_urgent_is_said_in_words_too() -> None:
     snapshot = LiveSnapshot(
         gauges=(gauge(problem="gauge x: it answers in inch"),),
-        encoders=EncoderSnapshot(problem="leg 3 is silent"),
-        controller=ControllerSnapshot(estop=True, enabled=False, error_messages=("drive 3",), age_s=0.1),
+        encoders=Shown(problem="leg 3 is silent"),
+        controller=Shown(value=ControllerStatus(True, False, ("drive 3",)), age_s=0.1),
         stop_reason="the door is open",
     )
     assert device_lines(snapshot) == [

@@ -6,13 +6,14 @@ from typing import Any
 
 import pytest
 
+from drivers.interfaces import EncoderSample
 from hexacell.campaign.decisions import Forecast
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.cli.arguments import make_parser
 from hexacell.results.written_geometry import TaskDisplacement
-from hexacell.run_process.messages import EncoderSnapshot, GaugeSnapshot, LiveSnapshot
+from hexacell.run_process.messages import GaugeSnapshot, LiveSnapshot, Shown
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services.run.calibration_run import RunRequest
 from hexacell.text.documents import run_document
@@ -121,7 +122,7 @@ def test_what_the_devices_show() -> None:
                 name="w", axis="z", shown_mm=1.0, age_s=3.0, problem="gauge w: is silent", travel_mm=1
             ),
         ),
-        encoders=EncoderSnapshot(positions=(1.0, -2.0, 3.5, 4.0, 5.0, 6.0), age_s=0.0),
+        encoders=Shown(value=EncoderSample((), (1.0, -2.0, 3.5, 4.0, 5.0, 6.0)), age_s=0.0),
         stop_reason="the stop file is there",
     )
     text = gauges_text(snapshot)

@@ -8,10 +8,9 @@ driver against a twin of the device: one that the package brings, or one of :fun
 """
 
 from drivers.conformance.controllers import ControllerConformance, ControllerTwin
-from drivers.conformance.encoders import EncoderConformance, EncoderTwin
-from drivers.conformance.gauges import GaugeConformance, GaugeTwin
+from drivers.conformance.encoders import EncoderConformance, EncoderTwin, served_encoder_twin
+from drivers.conformance.gauges import GaugeConformance, GaugeTwin, served_twin
 from drivers.conformance.recorded_lines import DialogueDiffers, recorded_bus, recorded_line
-from drivers.conformance.twins import served_encoder_twin, served_twin
 
 __all__ = [
     "ControllerConformance",

@@ -7,14 +7,18 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Protocol
 
-from drivers.conformance.suite import FAULTS, Suite, against_twin, failure, require_named
+from drivers.conformance.suite import FAULTS, TWIN_SPEED, Suite, against_twin, failure, require_named
 from drivers.encoders.bank import joint_variables
 from drivers.interfaces import EncoderBank
+from drivers.simulated.cell import encoder_bank
+from drivers.simulated.served_device import Closeable
 from hexacell.cell.devices import EncoderSettings
 from hexacell.cell.simulation import FaultKind
+from hexacell.clock import CellClock
 
 POSITIONS = ((0.0,) * 6, (1.5, -2.25, 4.0, -0.5, 0.25, 3.0), (-1.0, 1.0, -1.0, 1.0, -1.0, 1.0))
 STEPS, STEP, PAUSE_S = 40, 0.05, 2e-4
+FAULTY_LEG = 3
 
 
 class EncoderTwin(Protocol):
@@ -137,3 +141,26 @@ def _moving(twin: EncoderTwin) -> Iterator[None]:
     finally:
         ended.set()
         mover.join()
+
+
+class served_encoder_twin(Closeable):  # noqa: N801
+    """Six simulated encoders in this process, CiA 406 or what the settings describe.
+
+    They stand where they are put.
+    """
+
+    def __init__(self, settings: EncoderSettings) -> None:
+        self._joints: Sequence[float] = (0.0,) * 6
+        self._bank = encoder_bank(settings, lambda: self._joints, CellClock(TWIN_SPEED))
+        self.settings = settings.model_copy(update=self._bank.address)
+
+    def stand_at(self, joints: Sequence[float]) -> None:
+        """Move all joints at once, in the unit of the joint variables."""
+        self._joints = tuple(joints)
+
+    def inject(self, fault: FaultKind, *, on: bool) -> None:
+        """Switch a fault of leg 3 on or off."""
+        self._bank.faults(FAULTY_LEG)[fault](on=on)
+
+    def close(self) -> None:
+        self._bank.close()

@@ -2,15 +2,18 @@
 
 import asyncio
 from abc import abstractmethod
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 from typing import Protocol
 
-from drivers.conformance.suite import FAULTS, Suite, against_twin, failure, require_named
+from drivers.conformance.suite import FAULTS, TWIN_SPEED, Suite, against_twin, failure, require_named
 from drivers.interfaces import Gauge
 from drivers.serial.shared_port import SharedSerialPorts
+from drivers.simulated.gauges.bank import InstrumentFactory, SimulatedGaugeBank
+from drivers.simulated.served_device import Closeable, Switch
 from hexacell.cell.devices import GaugeSettings
-from hexacell.cell.simulation import FaultKind
+from hexacell.cell.simulation import FaultKind, SimulatedGauges
+from hexacell.clock import CellClock
 from hexacell.errors import DeviceError
 
 WORST_LATENCY_S = 0.2
@@ -125,3 +128,34 @@ class GaugeConformance(Suite[Gauge, GaugeTwin]):
                 yield gauge
         finally:
             await self._ports.close()
+
+
+class served_twin(Closeable):  # noqa: N801 - named as what a test writes behind ``with``
+    """One simulated gauge on a pseudo-terminal, an instrument of one's own or that of the protocol.
+
+    It shows the length that is set.
+    """
+
+    def __init__(self, settings: GaugeSettings, instrument: InstrumentFactory | None = None) -> None:
+        self._mm = 0.0
+        others = {} if instrument is None else {settings.protocol: instrument}
+        plungers = {settings.name: lambda: self._mm}
+        simulated = SimulatedGauges(flicker_mm=0.0)
+        self._bank = SimulatedGaugeBank([settings], plungers, simulated, CellClock(TWIN_SPEED), others)
+        [self.settings] = self._bank.gauges
+
+    def show(self, mm: float) -> None:
+        """Move the plunger, mm from the middle of its travel."""
+        self._mm = mm
+
+    def inject(self, fault: FaultKind, *, on: bool) -> None:
+        """Switch a fault on or off."""
+        self.faults[fault](on=on)
+
+    @property
+    def faults(self) -> Mapping[FaultKind, Switch]:
+        """Its faults by name."""
+        return self._bank.faults(self.settings.name)
+
+    def close(self) -> None:
+        self._bank.close()

@@ -14,6 +14,9 @@ FAULTS: tuple[FaultKind, ...] = ("unplugged", "silent")
 LONGEST_S = 60.0
 """No call may take longer, whatever the device does."""
 
+TWIN_SPEED = 100.0
+"""Its answers are so much quicker than those of a real line."""
+
 DeviceT = TypeVar("DeviceT", bound=Device[Any])
 TwinT = TypeVar("TwinT")
 

@@ -14,8 +14,8 @@ from drivers.gauges.plausibility import decimals_of
 from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec, Unit
 from drivers.gauges.serial_gauge import SerialGauge, ValueOnlyGauge
 from drivers.gauges.streaming import Origin, StreamingGauge
-from drivers.serial.framing import LINE_ENDS
 from drivers.serial.modbus_port import FUNCTIONS, REQUEST, ModbusPort
+from drivers.serial.request_port import LINE_ENDS
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.described_devices import NUMBER, DescribedFrame
 from hexacell.cell.devices import GaugeSettings

@@ -16,9 +16,8 @@ from typing import Any
 import serial
 
 from drivers.libraries import optional
-from drivers.serial.framing import is_copies
 from drivers.serial.opening import SLICE_S, lost_port, opened_port
-from drivers.serial.request_port import NoAnswer, RequestPort
+from drivers.serial.request_port import NoAnswer, RequestPort, is_copies
 from drivers.wire_trace import TrafficDirection
 from hexacell.clock import Patience
 from hexacell.errors import DeviceError

@@ -13,10 +13,18 @@ from math import inf
 
 import serial
 
-from drivers.serial.framing import FRAME_LIMIT, LINE_ENDS, FrameLog, cut_frame, is_copies
 from drivers.serial.opening import SLICE_S, close_port, lost_port, opened_port
 from drivers.serial.parity import have_terminal_check, in_software
-from drivers.serial.request_port import WORST_LATENCY_S, NoAnswer, RequestPort
+from drivers.serial.request_port import (
+    FRAME_LIMIT,
+    LINE_ENDS,
+    WORST_LATENCY_S,
+    FrameLog,
+    NoAnswer,
+    RequestPort,
+    cut_frame,
+    is_copies,
+)
 from drivers.wire_trace import TraceRecorder, TrafficDirection
 from hexacell.clock import Patience
 from hexacell.errors import DeviceError

@@ -34,7 +34,7 @@ from hexacell.campaign.pose_list import PoseList
 from hexacell.campaign.stopping_rules import Goal, StoppingRules
 from hexacell.campaign.task_accuracy import Task, planned_systematic_mm
 from hexacell.cell.model import CellSettings
-from hexacell.design.search_effort import USUAL_EFFORT, SearchEffort
+from hexacell.design.candidate_refinement import USUAL_EFFORT, SearchEffort
 from hexacell.errors import IdentifiabilityError, LimitError
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch

@@ -18,12 +18,12 @@ from hexacell.cell.fields import GeometrySettings, InRange, NotNegative, Positiv
 from hexacell.cell.limits import LimitSettings, SpeedSettings
 from hexacell.cell.measuring import GuardSettings, NoiseSettings, TimingSettings
 from hexacell.cell.model import CellSettings, ToleranceSettings
-from hexacell.cell.model_terms import ModelSettings
 from hexacell.cell.robot import ControllerSettings, RobotSettings, RotaryControllerSettings, mechanism_of
 from hexacell.cell.simulation import SimulatedEncoders, SimulatedJoints, SimulatedMotion, SimulationSettings
 from hexacell.cell.uncertainty import (
     CommonUncertaintySettings,
     LinearUncertaintySettings,
+    ModelSettings,
     RotaryUncertaintySettings,
     UncertaintySettings,
 )

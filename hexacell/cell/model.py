@@ -28,7 +28,6 @@ from hexacell.cell.measuring import (
     TimingSettings,
     VerificationSettings,
 )
-from hexacell.cell.model_terms import ModelSettings
 from hexacell.cell.operation import (
     MOST_NOTIFICATIONS,
     ArchiveSettings,
@@ -40,7 +39,7 @@ from hexacell.cell.operation import (
 from hexacell.cell.recovery import RecoverySettings
 from hexacell.cell.robot import ControllerSettings, RobotSettings
 from hexacell.cell.simulation import SimulationSettings
-from hexacell.cell.uncertainty import CommonUncertaintySettings, LengthCheckSettings
+from hexacell.cell.uncertainty import CommonUncertaintySettings, LengthCheckSettings, ModelSettings
 from hexacell.kinematics.commanded_motion import RefusedCommands
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import JointUnit

@@ -1,4 +1,4 @@
-"""Sections of what records hardly show: sizes of effects, and the length check of encoders."""
+"""Sections of what records hardly show: sizes of effects, the length check, terms beside the geometry."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self, get_args
@@ -241,3 +241,23 @@ class LengthCheckSettings(Section):
                 "Write the expanded uncertainty of the certificate, in mm",
             )
         return self
+
+
+TermName = Literal["backlash", "play", "compliance"]
+
+
+class ModelSettings(Section):
+    """Terms of the model beside the geometry, which are taken where the records show them."""
+
+    terms: tuple[TermName, ...] = key(
+        ("backlash", "play", "compliance"),
+        "terms that records are searched for; compliance with uncertainty.own_weight_n only; [] for none",
+        max_length=3,
+    )
+    backlash: Positive = key(
+        0.1, "what the backlash of a joint may be, 1 sigma before measuring", alias="backlash_mm"
+    )
+    play_mm: Positive = key(0.1, "what the play of a leg may be, mm, 1 sigma before measuring")
+    compliance_um_n: Positive = key(
+        0.3, "what the compliance of a leg may be, um/N, 1 sigma before measuring"
+    )

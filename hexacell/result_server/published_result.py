@@ -8,8 +8,7 @@ from enum import IntEnum
 
 from hexacell.cell.loader import Cell
 from hexacell.errors import FileError
-from hexacell.runs.archived_documents import folder_stamps
-from hexacell.runs.run_folder import runs_folder
+from hexacell.runs.run_folder import folder_stamps, runs_folder
 from hexacell.services.history.past_runs import past_runs
 from hexacell.services.history.run_index import PastRun
 from hexacell.verdict.decision import Verdict

@@ -1,7 +1,7 @@
 """The archive: an index over the run folders of a cell, in SQLite or in a PostgreSQL that cells share.
 
 The folders are the truth. The archive keeps documents that were derived from them, each with the stamp of
-its folder then (:mod:`~hexacell.runs.archived_documents`); where the folder has another stamp now, the
+its folder then (:mod:`~hexacell.runs.run_folder`); where the folder has another stamp now, the
 document counts for nothing. So it may be deleted at any time; a damaged file is replaced.
 """
 
@@ -35,7 +35,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.pool import NullPool
 from sqlalchemy.schema import CreateTable
 
-from hexacell.runs.archived_documents import ArchiveUnavailable, DocumentKind, StampedDocument
+from hexacell.runs.run_folder import ArchiveUnavailable, DocumentKind, StampedDocument
 from hexacell.storage.atomic_files import NOT_FOR_OTHERS
 
 VERSION = 1

@@ -1,11 +1,13 @@
-"""Run folders: where every run of a cell is kept, what is in one, and why a run could not begin."""
+"""Run folders: where every run of a cell is kept, what is in one, and what is derived from it."""
 
 import itertools
 import json
+import os
 import re
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,7 @@ from pydantic import TypeAdapter, ValidationError
 from hexacell.cell.fields import Frozen, Name, first_mistake
 from hexacell.cell.loader import Cell
 from hexacell.errors import FileError, UsageError
-from hexacell.storage.atomic_files import create_folder_durably, read_text, write_atomically
+from hexacell.storage.atomic_files import create_folder_durably, os_errors, read_text, write_atomically
 
 JOURNAL = "journal.jsonl"
 CELL_FILE = "cell.toml"
@@ -215,3 +217,49 @@ def note_attempt(folder: RunFolder, mode: str, attempt: StartAttempt) -> StartAt
     create_folder_durably(folder.path)
     write_atomically(folder.attempts, f"{attempts.model_dump_json(indent=1)}\n".encode())
     return attempts
+
+
+class DocumentKind(StrEnum):
+    """What the archive keeps of a run; of a cell, under no run's name, its status for others."""
+
+    SUMMARY = "summary"
+    RESULT = "result"
+    EVIDENCE = "evidence"
+    CELL = "cell"
+
+
+@dataclass(frozen=True, slots=True)
+class StampedDocument:
+    """A document that was derived from a run folder when that had the ``stamp``."""
+
+    stamp: str
+    content: bytes
+
+
+class ArchiveUnavailable(FileError):
+    """The archive cannot be used; what is asked of it must be read from the folders."""
+
+
+def folder_stamps(folder: Path) -> dict[str, str]:
+    """The stamp of each run folder in ``folder``, by name; empty where ``folder`` does not exist.
+
+    Hidden folders are no runs.
+
+    A journal only grows, and every other file of a run is put in its place by a rename, which changes the
+    time of its folder. The times of status changes count, which no program can set.
+
+    Raises:
+        FileError: the folder cannot be read.
+    """
+    with os_errors("cannot be read", folder), suppress(FileNotFoundError), os.scandir(folder) as found:
+        runs = [one for one in found if one.is_dir() and not one.name.startswith(".")]
+        return {one.name: f"{_times(one.path)} {_times(f'{one.path}/{JOURNAL}')}" for one in runs}
+    return {}
+
+
+def _times(path: str) -> str:
+    try:
+        status = os.stat(path)  # noqa: PTH116 - half the time
+    except OSError as error:
+        return f"error {error.errno}"
+    return f"{status.st_ino}:{status.st_size}:{status.st_mtime_ns}:{status.st_ctime_ns}"

@@ -14,7 +14,7 @@ from hexacell.text.verdict import teaching_sentence
 
 if TYPE_CHECKING:
     from drivers.interfaces import DeviceIdentity
-    from hexacell.dry_run.quick_level import QuickTrial
+    from hexacell.dry_run.campaign import QuickTrial
     from hexacell.results.run_comparison import ParameterTrend, RunComparison
     from hexacell.runs.run_folder import RunFolder
     from hexacell.services.history.drift_history import DriftHistory, FoundChange

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from drivers.interfaces import DeviceIdentity
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
 from hexacell.checks.quick_level import QuickAccuracy
-from hexacell.dry_run.quick_level import QuickTrial
+from hexacell.dry_run.campaign import QuickTrial
 from hexacell.dry_run.verdict_forecast import NOISE, WANTED, VerdictForecast
 from hexacell.lengths import shown, unit_of
 from hexacell.measurements.records import RecordId

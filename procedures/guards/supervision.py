@@ -25,8 +25,8 @@ from hexacell.clock import CellClock
 from hexacell.errors import HexacellError
 from hexacell.storage import atomic_files
 from procedures.guards.polling import PolledDevices
+from procedures.guards.rules import first_trip
 from procedures.guards.rules.base import GuardLimits
-from procedures.guards.rules.registry import first_trip
 from procedures.run.cancellation import cancel_and_wait, shielded
 from procedures.run.trips import Guard, GuardTripped, Trip
 

@@ -40,7 +40,7 @@ def command(*arguments: object) -> list[str]:
 WITH_LITTLE_EFFORT = """
 import sys
 from hexacell.__main__ import main
-from hexacell.design.search_effort import SearchEffort
+from hexacell.design.candidate_refinement import SearchEffort
 from hexacell import services
 services.EFFORT = SearchEffort(
     candidates=64,

@@ -23,7 +23,7 @@ from hexacell.errors import Interruption
 from hexacell.text.line_face import activity, event_text
 from procedures.engine.commands import Abort
 from procedures.guards.polling import DevicePoller, PolledDevices
-from procedures.guards.rules.registry import first_trip
+from procedures.guards.rules import first_trip
 from procedures.journal.journal import read_journal
 from procedures.run.state import fold
 from procedures.steps.read_temperatures import TemperaturesRead

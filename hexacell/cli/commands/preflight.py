@@ -6,7 +6,7 @@ import asyncio
 from drivers.errors import BusError, ConnectionLost, GaugeSilent, PortLost, SilentNodeError, WrongAnswer
 from hexacell.cli.commands.cell import cell_with_devices_at
 from hexacell.cli.console import Console
-from hexacell.dry_run.quick_level import try_quick_level
+from hexacell.dry_run.campaign import try_quick_level
 from hexacell.errors import ExitCode, HexacellError, flatten_errors
 from hexacell.services.offline import try_plan
 from hexacell.services.run.calibration_run import new_calibration, preflight

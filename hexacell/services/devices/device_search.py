@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from drivers.discovery import USUAL, SearchTimeouts
-from drivers.discovery.controllers import FoundController, search_controller
+from drivers.discovery import USUAL, FoundController, SearchTimeouts, search_controller
 from drivers.discovery.encoders import (
     BusFindings,
     FoundNode,

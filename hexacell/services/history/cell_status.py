@@ -18,9 +18,8 @@ from pydantic import ValidationError
 from hexacell.cell.fields import Frozen, Name, Text
 from hexacell.cell.loader import Cell
 from hexacell.errors import HexacellError
-from hexacell.runs.archived_documents import DocumentKind, StampedDocument
 from hexacell.runs.cell_lock import lock_holder
-from hexacell.runs.run_folder import runs_folder
+from hexacell.runs.run_folder import DocumentKind, StampedDocument, runs_folder
 from hexacell.services.history.drift_history import DriftHistory, drift_history
 from hexacell.services.history.past_runs import past_runs
 from hexacell.services.history.run_index import PastRun, RunIndex, RunSummary

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 from hexacell.cell.loader import Cell
 from hexacell.kinematics.parameters import GeometricParameter
-from hexacell.runs.archived_documents import DocumentKind
-from hexacell.runs.run_folder import RunFolder
+from hexacell.runs.run_folder import DocumentKind, RunFolder
 from hexacell.services.history.run_index import EvidenceDocument, RunIndex
 from hexacell.storage.atomic_files import sha256
 

@@ -21,8 +21,7 @@ from typing import TYPE_CHECKING
 from hexacell.cell.loader import Cell
 from hexacell.config.layout import fingerprint
 from hexacell.config.pending_write import held_config
-from hexacell.runs.archived_documents import DocumentKind
-from hexacell.runs.run_folder import RunFolder, find_run, runs_folder
+from hexacell.runs.run_folder import DocumentKind, RunFolder, find_run, runs_folder
 from hexacell.services.history.run_index import PastRun, RunIndex, RunSummary
 from hexacell.storage.atomic_files import os_errors
 

@@ -19,13 +19,14 @@ from pydantic import BaseModel, ValidationError
 from hexacell.cell.fields import Frozen
 from hexacell.cell.loader import Cell
 from hexacell.kinematics.rotations import Array
-from hexacell.runs.archived_documents import (
+from hexacell.runs.run_folder import (
     ArchiveUnavailable,
     DocumentKind,
+    RunFolder,
     StampedDocument,
     folder_stamps,
+    runs_folder,
 )
-from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy
 
 if TYPE_CHECKING:

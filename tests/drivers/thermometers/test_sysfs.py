@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from drivers import thermometers
 from drivers.interfaces import TemperatureReading
-from drivers.thermometers import sysfs
-from drivers.thermometers.sysfs import SysfsThermometer
+from drivers.thermometers import SysfsThermometer
 from hexacell.cell.devices import ThermometerSettings
 from hexacell.errors import DeviceError
 
@@ -82,19 +82,19 @@ async def test_a_folder_or_a_pipe_is_no_thermometer(path, room, make, words):
 async def test_a_sensor_that_blocks_is_not_read_again(path, room, monkeypatch):
     """At most one read blocks at a time, and its late result is discarded."""
     answers = threading.Event()
-    content: Callable[[Path], str] = sysfs._content
+    content: Callable[[Path], str] = thermometers._content
 
     def slow(_: Path) -> str:
         answers.wait()
         return "99000"
 
-    monkeypatch.setattr(sysfs, "_content", slow)
+    monkeypatch.setattr(thermometers, "_content", slow)
     show(path, "20000")
     with pytest.raises(DeviceError, match=r"does not answer within 0\.5 s"):
         await room.read()
     with pytest.raises(DeviceError, match="still does not answer"):
         await room.read()
-    monkeypatch.setattr(sysfs, "_content", content)
+    monkeypatch.setattr(thermometers, "_content", content)
     hanging = room._reading
     assert hanging is not None
     answers.set()

@@ -12,8 +12,7 @@ from hexacell.campaign.planner import Plan
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.checks.check import Check, identified_before
-from hexacell.design.candidate_refinement import QUICK
-from hexacell.design.search_effort import SearchEffort
+from hexacell.design.candidate_refinement import QUICK, SearchEffort
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot.model import Robot, config_layout, make_robot

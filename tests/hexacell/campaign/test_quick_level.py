@@ -8,7 +8,7 @@ import pytest
 
 from hexacell.campaign.decisions import CampaignState
 from hexacell.checks.quick_level import AS_ACCURATE, QuickLevel
-from hexacell.dry_run.quick_level import try_quick_level
+from hexacell.dry_run.campaign import try_quick_level
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.mechanism import free_parameter_derivatives
 from hexacell.measurements.records import MeasurementSet

@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 
 from hexacell.runs.archive import INDEX, Archive
-from hexacell.runs.archived_documents import (
+from hexacell.runs.run_folder import (
     ArchiveUnavailable,
     DocumentKind,
+    RunFolder,
     StampedDocument,
     folder_stamps,
 )
-from hexacell.runs.run_folder import RunFolder
 from hexacell.storage.atomic_files import write_atomically
 
 SUMMARY, RESULT = DocumentKind.SUMMARY, DocumentKind.RESULT

@@ -5,8 +5,7 @@ from contextlib import closing
 from pathlib import Path
 
 from hexacell.runs.archive import INDEX, Archive
-from hexacell.runs.archived_documents import DocumentKind, StampedDocument
-from hexacell.runs.run_folder import runs_folder
+from hexacell.runs.run_folder import DocumentKind, StampedDocument, runs_folder
 from hexacell.services.history.past_runs import past_runs
 from hexacell.services.history.run_index import RunIndex
 from tests.hexacell.services.proposed_runs import a_cell, propose_run

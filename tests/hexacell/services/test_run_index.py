@@ -9,8 +9,7 @@ import pytest
 from hexacell.cell.loader import Cell
 from hexacell.config.write_back import commit
 from hexacell.runs.archive import INDEX, Archive
-from hexacell.runs.archived_documents import DocumentKind, StampedDocument
-from hexacell.runs.run_folder import RunFolder, runs_folder
+from hexacell.runs.run_folder import DocumentKind, RunFolder, StampedDocument, runs_folder
 from hexacell.services.history.past_runs import past_runs
 from hexacell.services.history.run_index import PastRun, RunIndex
 from procedures.journal.journal import Entry, Journal, read_entries

@@ -17,9 +17,9 @@ from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.limits.gauge_travel import GaugeRoom
 from hexacell.noise.allowances import ReferenceChange
 from procedures.guards.polling import DevicePoller, GaugeDeviation, LineActivity, PolledDevices
+from procedures.guards.rules import first_trip
 from procedures.guards.rules.after_a_move import following_error, stuck_gauge
 from procedures.guards.rules.base import GuardLimits
-from procedures.guards.rules.registry import first_trip
 from procedures.guards.supervision import low_disk_space
 from procedures.run.trips import DriftTripped, Guard, GuardTripped, Trip
 from procedures.steps import events

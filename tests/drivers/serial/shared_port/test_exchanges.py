@@ -8,8 +8,7 @@ import serial
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.serial.framing import FRAME_LIMIT, LINE_ENDS, cut_frame
-from drivers.serial.request_port import NoAnswer
+from drivers.serial.request_port import FRAME_LIMIT, LINE_ENDS, NoAnswer, cut_frame
 from hexacell.errors import DeviceError
 from tests.drivers.serial.shared_port.conftest import (
     FOREVER_S,

@@ -20,7 +20,7 @@ from hexacell.storage.atomic_files import os_error_to_file_error
 MAX_BYTES = 64
 PLAUSIBLE_C = (-100.0, 300.0)
 
-_log = logging.getLogger("drivers.thermometers")
+_log = logging.getLogger(__name__)
 
 
 class SysfsThermometer:

@@ -1,1 +1,0 @@
-"""Drivers of thermometers, one protocol a file."""

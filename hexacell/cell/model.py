@@ -41,6 +41,7 @@ from hexacell.cell.robot import ControllerSettings, RobotSettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.cell.uncertainty import CommonUncertaintySettings, LengthCheckSettings, ModelSettings
 from hexacell.kinematics.commanded_motion import RefusedCommands
+from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.storage.toml_document import KeyPath
@@ -99,6 +100,11 @@ class CellSettings(Section):
     def mechanism(self) -> Mechanism:
         """The mechanism that the file names; raises ``UsageError`` if it is not installed."""
         return self.robot.built()
+
+    @property
+    def drawing(self) -> Geometry:
+        """The geometry by the drawing, in the drawing's frames."""
+        return Geometry.of(self.mechanism.parameters, self.robot.nominal.model_dump())
 
     @property
     def excluded_points(self) -> frozenset[int]:

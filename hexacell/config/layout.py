@@ -6,12 +6,15 @@ and the zeros of the legs in the INI file. Each parameter is looked for in every
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
+from hexacell.cell.loader import Cell
+from hexacell.cell.model import CellSettings
 from hexacell.config.interface import (
     LARGEST_CONFIG_BYTES,
     ConfigFormat,
@@ -19,11 +22,13 @@ from hexacell.config.interface import (
     ControllerGeometry,
     ControllerLimits,
 )
+from hexacell.config.linuxcnc_ini import limits_of_ini
 from hexacell.errors import FileError
 from hexacell.kinematics.corrections import NO_CORRECTIONS, CorrectionKind, Corrections
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
 from hexacell.kinematics.parameters import JointUnit, ParameterSet
+from hexacell.plugins import Group, load
 from hexacell.storage import atomic_files
 
 
@@ -45,6 +50,23 @@ class ConfigLayout:
     parameters: ParameterSet
     formats: tuple[FormatOfFile, ...]
     joint_unit: JointUnit = JointUnit.MM
+
+    @classmethod
+    def of(cls, settings: CellSettings) -> Self:
+        """The layout of a cell's controller config.
+
+        Raises:
+            UsageError: there is no such format, or its options are wrong.
+        """
+        controller, parameters = settings.controller, settings.mechanism.parameters
+        is_part = bool(controller.further_files)
+        files = [(controller.config_format, controller.config_options)]
+        files += [(one.config_format, one.config_options) for one in controller.further_files]
+        formats = tuple(
+            FormatOfFile(name, load(Group.CONFIG_FORMATS, name)(parameters, options, is_part=is_part))
+            for name, options in files
+        )
+        return cls(parameters, formats, settings.mechanism.words.joint_unit)
 
     @property
     def holds(self) -> frozenset[CorrectionKind]:
@@ -174,6 +196,19 @@ def _not_in_one(name: str, having: Sequence[Path], paths: Sequence[Path]) -> Fil
         subject=paths[0],
         action="Name the file that has it in [[controller.further_files]], or correct config_options",
     )
+
+
+def controller_geometry(cell: Cell, *paths: Path) -> ControllerGeometry:
+    """What a cell's config states, or a copy of its files; with the limits of the INI file of the cell.
+
+    Raises:
+        FileError: one of the files is absent, or does not hold what it should.
+    """
+    found = ConfigLayout.of(cell.settings).read(*(paths or cell.config_paths))
+    if (ini := cell.settings.limits.ini) is None:
+        return found
+    limits = limits_of_ini(cell.path.parent / ini, cell.settings.controller.unit_mm)
+    return replace(found, limits=found.limits.narrowed(limits))
 
 
 class CurrentConfig:

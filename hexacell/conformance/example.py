@@ -10,8 +10,8 @@ import numpy as np
 from hexacell.identification.problem.prior import Tolerances
 from hexacell.kinematics import rotations
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.mechanism import Branch, Mechanism
+from hexacell.kinematics.pose import FrameTransform, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import singularity_margin
 

@@ -57,16 +57,6 @@ class SingleCauseTest:
     sigmas: Array
     limit: float
 
-    @property
-    def likeliest(self) -> int:
-        """The cause with the largest score."""
-        return int(np.abs(self.scores).argmax())
-
-    @property
-    def is_alarm(self) -> bool:
-        """Whether an unchanged robot is contradicted."""
-        return bool(np.abs(self.scores).max() > self.limit)
-
 
 def single_cause_test(records: WhitenedRecords, covariance: Array, causes: Array) -> SingleCauseTest:
     """Test each of m causes.

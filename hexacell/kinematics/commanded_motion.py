@@ -24,8 +24,8 @@ import numpy as np
 
 from hexacell.kinematics.forward import ForwardResult, continue_solution
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
-from hexacell.kinematics.pose import AXES, Batch, Pose, PoseBatch
+from hexacell.kinematics.mechanism import Branch, Mechanism
+from hexacell.kinematics.pose import AXES, Batch, FrameTransform, Pose, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 
 COMMAND_STAGES = (3,)

@@ -13,7 +13,7 @@ from hexacell.errors import ReachError
 from hexacell.kinematics.geometry import Geometries, Geometry
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.parameters import GeometricParameter, JointUnit, ParameterSet
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.pose import FrameTransform, PoseBatch
 from hexacell.kinematics.rotations import Array
 
 Sign = Literal[1, -1]
@@ -133,43 +133,6 @@ class FrameFreedom:
         """Which of nine small changes are free: shifts, then turns of the base, then of the platform."""
         kinds = (self.shift, self.base, self.platform)
         return [3 * kind + "xyz".index(axis) for kind, axes in enumerate(kinds) for axis in axes]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FrameTransform:
-    """The change from one choice of base and platform frames to another, for the same machine.
-
-    A position becomes ``base @ (P - origin)``, a rotation ``base @ R @ platform.T``.
-    """
-
-    base: Array
-    origin: Array
-    platform: Array
-
-    def then(self, further: FrameTransform) -> FrameTransform:
-        """This change and a further one in one."""
-        origin = self.origin + self.base.T @ further.origin
-        return FrameTransform(further.base @ self.base, origin, further.platform @ self.platform)
-
-    def poses(self, poses: PoseBatch) -> PoseBatch:
-        """Poses in the new frames."""
-        return PoseBatch(
-            (poses.positions - self.origin) @ self.base.T,
-            # Products of small matrices are twice as fast in one layout.
-            self.base @ poses.rotations @ np.ascontiguousarray(self.platform.T),
-        )
-
-    def deviations(self, deviations: Array) -> Array:
-        """Differences of positions (n, 3), mm, in the new base frame."""
-        return deviations @ self.base.T
-
-    def inverse(self) -> FrameTransform:
-        """The opposite change."""
-        base, platform = np.ascontiguousarray(self.base.T), np.ascontiguousarray(self.platform.T)
-        return FrameTransform(base, -self.base @ self.origin, platform)
-
-
-SAME_FRAMES = FrameTransform(np.eye(3), np.zeros(3), np.eye(3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hexacell.kinematics.geometry import Geometries, Geometry
-from hexacell.kinematics.mechanism import SAME_FRAMES, FrameTransform, Mechanism
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.pose import SAME_FRAMES, FrameTransform, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.limits.gauge_travel import GaugeRoom, GaugeTravel, Three
 from hexacell.limits.leg_limits import ROUNDING, LegLimits

@@ -23,8 +23,8 @@ import numpy as np
 from hexacell.kinematics import rotations
 from hexacell.kinematics.forward import forward_kinematics, modes_of
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import SAME_FRAMES, Branch, FrameTransform, Mechanism
-from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.mechanism import Branch, Mechanism
+from hexacell.kinematics.pose import SAME_FRAMES, FrameTransform, Pose, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 
 PIECES = 12

@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from pathlib import Path
-
-import numpy as np
 
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
 from hexacell.config.interface import ControllerGeometry
-from hexacell.config.layout import ConfigLayout, FormatOfFile
-from hexacell.config.linuxcnc_ini import limits_of_ini
+from hexacell.config.layout import ConfigLayout, controller_geometry
 from hexacell.errors import FileError
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.geometry_change import largest_change
@@ -33,14 +29,13 @@ from hexacell.identification.terms.term import ModelTerm
 from hexacell.kinematics.commanded_motion import CommandedRobot, RefusedCommands
 from hexacell.kinematics.corrections import NO_CORRECTIONS, CorrectionKind, Corrections
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism, joint_zeros
-from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.mechanism import Branch, Mechanism, joint_zeros
+from hexacell.kinematics.pose import FrameTransform, Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.limits.limits import Limits
 from hexacell.measurements.records import MeasurementSet
-from hexacell.plugins import Group, load
 from hexacell.robot.same_robot import require_frames, require_same_robot
-from hexacell.robot.stated import stated_effects, stated_limits, stated_terms
+from hexacell.robot.stated import noise_of, stated_effects, stated_limits, stated_terms
 from hexacell.uncertainty.effects import Effect, errors_by_effects
 
 
@@ -246,36 +241,6 @@ class Robot:
         return self.frames.inverse().poses(PoseBatch.of([pose])).pose(0)
 
 
-def config_layout(settings: CellSettings) -> ConfigLayout:
-    """The readers and writers of the files of a cell's controller config.
-
-    Raises:
-        UsageError: there is no such format, or its options are wrong.
-    """
-    controller, parameters = settings.controller, settings.mechanism.parameters
-    is_part = bool(controller.further_files)
-    files = [(controller.config_format, controller.config_options)]
-    files += [(one.config_format, one.config_options) for one in controller.further_files]
-    formats = tuple(
-        FormatOfFile(name, load(Group.CONFIG_FORMATS, name)(parameters, options, is_part=is_part))
-        for name, options in files
-    )
-    return ConfigLayout(parameters, formats, settings.mechanism.words.joint_unit)
-
-
-def controller_geometry(cell: Cell, *paths: Path) -> ControllerGeometry:
-    """What a cell's config states, or a copy of its files; with the limits of the INI file of the cell.
-
-    Raises:
-        FileError: one of the files is absent, or does not hold what it should.
-    """
-    found = config_layout(cell.settings).read(*(paths or cell.config_paths))
-    if (ini := cell.settings.limits.ini) is None:
-        return found
-    limits = limits_of_ini(cell.path.parent / ini, cell.settings.controller.unit_mm)
-    return replace(found, limits=found.limits.narrowed(limits))
-
-
 def robot_of(cell: Cell) -> Robot:
     """The robot of a cell, with the geometry its controller's config holds now.
 
@@ -283,31 +248,20 @@ def robot_of(cell: Cell) -> Robot:
         FileError: the config, or that of the time of teaching, is absent or does not hold a geometry.
     """
     controller = controller_geometry(cell)
-    taught = config_layout(cell.settings).read(*cell.taught_paths)
+    taught = ConfigLayout.of(cell.settings).read(*cell.taught_paths)
     if taught.branch != controller.branch:
         raise FileError(
             "its branch is not that of the controller's config, so it is not of this robot",
             subject=cell.taught_path,
             action="Copy the config there when you teach points and frames, or remove `taught`",
         )
-    nominal = Geometry.of(cell.settings.mechanism.parameters, cell.settings.robot.nominal.model_dump())
+    nominal = cell.settings.drawing
     for geometry, path in ((controller.geometry, cell.config_path), (taught.geometry, cell.taught_path)):
         require_frames(cell.settings.mechanism, geometry, path)
     line = cell.document.line_of(("robot", "nominal"))
     require_frames(cell.settings.mechanism, nominal, cell.path, line)
     require_same_robot(cell, nominal, controller.geometry)
     return make_robot(cell.settings, controller, taught=taught.geometry)
-
-
-def noise_of(settings: CellSettings) -> Noise:
-    """The noise of a record that a cell's settings state."""
-    stated = settings.noise
-    alignment = float(np.radians(settings.stations.alignment_deg))
-    noise = Noise(stated.encoder, stated.gauge_mm, alignment, stated.gauge_scale, stops=stated.stops)
-    if stated.encoders is None and stated.gauges_mm is None:
-        return noise
-    encoders, gauges = noise.encoders.tolist(), noise.gauges_mm.tolist()
-    return noise.with_devices(stated.encoders or encoders, stated.gauges_mm or gauges)
 
 
 def make_robot(
@@ -317,8 +271,7 @@ def make_robot(
 
     ``taught`` is the geometry with which points and frames were taught; by default the controller's.
     """
-    mechanism = settings.mechanism
-    nominal = Geometry.of(mechanism.parameters, settings.robot.nominal.model_dump())
+    mechanism, nominal = settings.mechanism, settings.drawing
     drawn = CommandingGeometry.of(mechanism, nominal)
     frames = mechanism.normalize_frames(controller.geometry)[1]
     return Robot(

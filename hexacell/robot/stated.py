@@ -1,4 +1,4 @@
-"""The limits of motion and the systematic effects that a cell file states, as the mathematics has them."""
+"""The noise, limits and systematic effects that a cell file states, as the mathematics has them."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,15 +13,16 @@ from hexacell.cell.uncertainty import (
 )
 from hexacell.config.interface import ControllerGeometry, ControllerLimits
 from hexacell.errors import ReachError
+from hexacell.identification.problem.prior import Noise
 from hexacell.identification.terms.backlash import backlash
 from hexacell.identification.terms.compliance import compliance
 from hexacell.identification.terms.play import play
 from hexacell.identification.terms.term import ModelTerm
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.legs import Legs
-from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism, joint_zeros
+from hexacell.kinematics.mechanism import Branch, Mechanism, joint_zeros
 from hexacell.kinematics.parameters import LEGS, MachinePart
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.pose import FrameTransform, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.limits.gauge_travel import GaugeTravel
 from hexacell.limits.leg_limits import LegLimits
@@ -46,6 +47,17 @@ from hexacell.uncertainty.effect_kinds import (
 from hexacell.uncertainty.effects import Effect
 
 NO_CONE_DEG = 180.0
+
+
+def noise_of(settings: CellSettings) -> Noise:
+    """The noise of a record that a cell's settings state."""
+    stated = settings.noise
+    alignment = float(np.radians(settings.stations.alignment_deg))
+    noise = Noise(stated.encoder, stated.gauge_mm, alignment, stated.gauge_scale, stops=stated.stops)
+    if stated.encoders is None and stated.gauges_mm is None:
+        return noise
+    encoders, gauges = noise.encoders.tolist(), noise.gauges_mm.tolist()
+    return noise.with_devices(stated.encoders or encoders, stated.gauges_mm or gauges)
 
 
 def stated_limits(settings: CellSettings, controller: ControllerGeometry, frames: FrameTransform) -> Limits:
@@ -106,7 +118,7 @@ def _leg_limits(settings: CellSettings, controller: ControllerGeometry) -> LegLi
     if distance == 0.0 and np.min(cones) >= NO_CONE_DEG:
         return None
     mechanism = settings.mechanism
-    drawing = _drawing(settings)
+    drawing = settings.drawing
     legs = _legs_in_the_middle(settings, mechanism, drawing, controller.branch)
     frames = mechanism.normalize_frames(drawing)[1]
     base = _unit(legs.directions_in_carriers[0] if stated.base_axes is None else stated.base_axes)
@@ -231,7 +243,7 @@ def _own_weight(settings: CellSettings) -> Effect:
 
 def _weight_acts(settings: CellSettings) -> tuple[Array, Array | None]:
     """Direction (3,) and centre (3,) of the weight in the convention; they are stated in the drawing's."""
-    stated, frames = settings.uncertainty, settings.mechanism.normalize_frames(_drawing(settings))[1]
+    stated, frames = settings.uncertainty, settings.mechanism.normalize_frames(settings.drawing)[1]
     centre = stated.own_weight_centre_mm
     direction = frames.base @ _unit(stated.own_weight_direction)
     return direction, None if centre is None else frames.platform @ np.array(centre)
@@ -247,7 +259,3 @@ def stated_terms(settings: CellSettings) -> tuple[ModelTerm, ...]:
         "compliance": compliance(stated.compliance_um_n, newton, *acts),
     }
     return tuple(terms[name] for name in stated.terms if newton or name != "compliance")
-
-
-def _drawing(settings: CellSettings) -> Geometry:
-    return Geometry.of(settings.mechanism.parameters, settings.robot.nominal.model_dump())

@@ -1,7 +1,6 @@
 """Virtual robots: geometries drawn within the tolerances, moved by the real controller's geometry."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -31,29 +30,6 @@ AS_DRAWN_MM = 1e-3
 WEAR_SHARE = 0.1
 """Share of the tolerances by which a robot may have drifted since it was calibrated."""
 
-Beside = Callable[[PoseBatch, Array], Array]
-"""How far the joints (6,) really are beside what their encoders show, at the pose (1) that ends their way
-(k, 6); each way begins where the one before it ended."""
-
-
-@dataclass(slots=True)
-class LostMotion:
-    """Joints with backlash: each follows its encoder once that has gone through its lost motion.
-
-    Attributes:
-        sizes: (6,) lost motion of each joint, in its unit.
-        behind: (6,) how far each joint is behind its encoder; in the middle until it has moved.
-    """
-
-    sizes: Array
-    behind: Array = field(default_factory=lambda: np.zeros(6))
-
-    def __call__(self, _pose: PoseBatch, way: Array) -> Array:
-        """How far the joints are beside what their encoders show at the end of a way (k, 6)."""
-        for step in np.diff(way, axis=0):
-            self.behind = np.clip(self.behind + step, -0.5 * self.sizes, 0.5 * self.sizes)
-        return -self.behind
-
 
 class VirtualRobot:
     """Goes where its controller commands it, on its own geometry, and answers with records.
@@ -66,7 +42,6 @@ class VirtualRobot:
         stops: one standard deviation of where a joint stops beside its command, as its encoder shows it, in
             its unit; by default what the model's noise states.
         unseen: likewise beside what its encoder shows.
-        beside: what else puts joints beside what their encoders show, as :class:`LostMotion`.
         smallest_margin: the smallest singularity margin of the true geometry along all moves so far.
     """
 
@@ -78,13 +53,11 @@ class VirtualRobot:
         *,
         stops: float | None = None,
         unseen: float = 0.0,
-        beside: Beside | None = None,
     ) -> None:
         self.model = model
         self.truth = truth
         self.stops = model.noise.stops if stops is None else stops
         self.unseen = unseen
-        self.beside = beside
         self.smallest_margin = np.inf
         self._random = random or np.random.default_rng()
         self._command: Pose | None = None
@@ -210,17 +183,14 @@ class VirtualRobot:
         self._directions = arrival_directions(way, self._directions, least)
         self._command, self._actual, self._shown = command, poses, joints
         self._joints_commanded = joints
-        beside = np.zeros((1, 6)) if self.beside is None else self.beside(poses, way)
-        if self.stops or self.unseen:
-            scatter = self._random.standard_normal((2, 1, 6))
-            self._shown = joints + self.stops * scatter[0]
-            beside = beside + self.unseen * scatter[1]
-        elif not np.any(beside):
+        if not (self.stops or self.unseen):
             return
+        scatter = self._random.standard_normal((2, 1, 6))
+        self._shown = joints + self.stops * scatter[0]
         found = continue_solution(
             model.mechanism,
             self.truth,
-            self._shown + beside,
+            self._shown + self.unseen * scatter[1],
             start=poses,
             start_geometry=self.truth,
             start_joints=joints,

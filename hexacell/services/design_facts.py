@@ -18,6 +18,7 @@ from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
 from hexacell.config.interface import ControllerGeometry
+from hexacell.config.layout import controller_geometry
 from hexacell.errors import FileError, HexacellError, ReachError, UsageError, joined
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.legs import Legs
@@ -27,7 +28,7 @@ from hexacell.kinematics.pose import AXES, Pose, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask, from_angles
 from hexacell.kinematics.sensitivity import has_singularity_margin, singularity_margin
 from hexacell.lengths import MM_PER_METRE
-from hexacell.robot.model import Robot, controller_geometry, make_robot, robot_of
+from hexacell.robot.model import Robot, make_robot, robot_of
 from hexacell.robot.pose_limits import broken_limits
 from hexacell.robot.same_robot import reordered
 from hexacell.services.other_units import (
@@ -132,7 +133,7 @@ def _points_in_metres(cell: Cell, controller: ControllerGeometry, commands: Pose
     """That the points are in metres: all are near the origin, and in millimetres the robot takes them."""
     far_mm = float(np.median(np.linalg.norm(commands.positions, axis=-1)))
     in_mm = PoseBatch(MM_PER_METRE * commands.positions, commands.rotations)
-    if not 0.0 < far_mm < POINTS_SHARE * size_mm_of(_drawing(cell.settings)):
+    if not 0.0 < far_mm < POINTS_SHARE * size_mm_of(cell.settings.drawing):
         return None
     if _can_stand(without_leg_limits(cell).settings, controller, in_mm).mean() < NEARLY_ALL:
         return None
@@ -166,15 +167,15 @@ def _others(
             + " ".join(str(leg + 1) for leg in order),
             "Leg 1 is the same leg in all lists, of the drawing and of the config: correct them",
         )
-        drawn = reordered(_drawing(settings), of_platform, order)
+        drawn = reordered(settings.drawing, of_platform, order)
         commanding = replace(controller, geometry=reordered(controller.geometry, of_platform, order))
         yield fact, _drawn_as(settings, drawn), commanding
-    if (size_mm := size_mm_of(_drawing(settings))) < SMALLEST_MACHINE_MM:
+    if (size_mm := size_mm_of(settings.drawing)) < SMALLEST_MACHINE_MM:
         problem = f"the drawing looks like metres: {size_mm:g} is its largest length"
         lengths = parameters.by_kind(
             {one.symbol: MM_PER_METRE if one.unit is ParameterUnit.MM else 1.0 for one in parameters.kinds}
         )
-        drawn = Geometry(parameters, lengths * _drawing(settings).vector)
+        drawn = Geometry(parameters, lengths * settings.drawing.vector)
         in_config = Geometry(parameters, lengths * controller.geometry.vector)
         fact = _of_drawing(cell, problem, "Write millimetres, or state unit_mm in the config's options")
         yield fact, _drawn_as(settings, drawn), replace(controller, geometry=in_config)
@@ -187,10 +188,6 @@ def _turned_orders() -> Iterator[tuple[int, ...]]:
             order = tuple((first + way * n) % LEGS for n in range(LEGS))
             if (first, way) != (0, 1):
                 yield order
-
-
-def _drawing(settings: CellSettings) -> Geometry:
-    return Geometry.of(settings.mechanism.parameters, settings.robot.nominal.model_dump())
 
 
 def _drawn_as(settings: CellSettings, drawing: Geometry) -> CellSettings:

@@ -38,8 +38,8 @@ from hexacell.noise.repeats import Repeats
 from hexacell.results.result import AcceptedResult
 from hexacell.results.term_result import known_terms, term_results
 from hexacell.results.written_geometry import as_written
-from hexacell.robot.model import Robot, noise_of
-from hexacell.robot.stated import stated_effects
+from hexacell.robot.model import Robot
+from hexacell.robot.stated import noise_of, stated_effects
 from hexacell.verdict.decision import ErrorLimits
 from hexacell.verdict.length_check import with_measured_scale
 from procedures.calibration.held_out_poses import HeldOutPoses, PosesByPoint, replacements

@@ -28,13 +28,12 @@ from drivers.errors import StartupNotPermitted
 from drivers.interfaces import Controller, StartupAction, StartupActions
 from hexacell.cell.loader import Cell
 from hexacell.config.change import RECEIPT, ConfigChange, Receipt, propose
-from hexacell.config.layout import Contents, fingerprint, fingerprint_of, read_contents
+from hexacell.config.layout import ConfigLayout, Contents, fingerprint, fingerprint_of, read_contents
 from hexacell.config.write_back import commit, rollback
 from hexacell.config.write_record import THE_RUN, WriteCause, WriteKind, recorded_write
 from hexacell.errors import FileError, HexacellError, Interruption, WriteBackUndone
 from hexacell.kinematics.corrections import Corrections
 from hexacell.kinematics.geometry import Geometry
-from hexacell.robot.model import config_layout
 from hexacell.runs.run_folder import RunFolder
 from procedures.guards.guards import Guards
 from procedures.run.cancellation import in_thread
@@ -145,7 +144,7 @@ class ConfigChanges:
         """
         return propose(
             self.cell.config_paths,
-            config_layout(self.cell.settings),
+            ConfigLayout.of(self.cell.settings),
             geometry,
             corrections,
             fingerprint_at_start=state.started.config_sha256 if state.started else "",
@@ -206,7 +205,7 @@ class ConfigChanges:
     @contextmanager
     def _recorded(self, cause: WriteCause) -> Iterator[None]:
         """Record a write; where that fails the run goes on, with a warning: its journal has the write."""
-        layout = config_layout(self.cell.settings)
+        layout = ConfigLayout.of(self.cell.settings)
         with recorded_write(self.folder.siblings, self.cell.config_paths, layout, cause) as recording:
             yield
         if recording.problem:

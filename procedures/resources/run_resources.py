@@ -13,7 +13,7 @@ from hexacell.campaign.budget import speed_limits
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
 from hexacell.clock import CellClock
-from hexacell.config.layout import CurrentConfig
+from hexacell.config.layout import ConfigLayout, CurrentConfig
 from hexacell.identification.terms.corrected_joints import commanded_joints
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -21,7 +21,6 @@ from hexacell.measurements.records import Directions, deviation_of, joints_of
 from hexacell.motion.arrival import arrival_directions, least_way
 from hexacell.motion.trajectory import LineDurations, interpolate_line
 from hexacell.noise.allowances import ReferenceChange
-from hexacell.robot.model import config_layout
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.calibration import Calibration
 from procedures.calibration.repeatability import since_zero
@@ -71,7 +70,7 @@ class RunResources:
     @cached_property
     def current_config(self) -> CurrentConfig:
         """The config that the controller is to run."""
-        return CurrentConfig(self.cell.config_paths, config_layout(self.settings))
+        return CurrentConfig(self.cell.config_paths, ConfigLayout.of(self.settings))
 
     @cached_property
     def startup(self) -> Startup:

@@ -70,6 +70,8 @@ class SetKey(Frozen):
                 return f"held-out point {self.point} with the new geometry"
             case Phase.CONFIRM:
                 return f"held-out point {self.point} with the new geometry, confirming records"
+            case Phase.LENGTH:
+                return f"mounting {self.point}"
         return f"point {self.point}"
 
     @property

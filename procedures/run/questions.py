@@ -13,7 +13,7 @@ from hexacell.results.term_result import NOTHING_FOUND, FoundTerms
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.verification import Verification
-from procedures.run.keys import SetKey
+from procedures.run.keys import Phase, SetKey
 
 PLACED = "placed"
 """The one answer to a request to place the gauges."""
@@ -102,14 +102,9 @@ class Question:
 
 
 def ask_placement(at: SetKey, pose: Pose) -> Question:
-    """Ask for the gauges to be placed around the ball; answered when they are."""
-    place = GaugePlacement(at.point, pose, at.station)
-    return Question(place, choices=(PLACED,), default=PLACED)
-
-
-def ask_mounting(mounting: int, seat: int, pose: Pose) -> Question:
-    """Ask for the gauges to be mounted in a seat of the fixture; answered when they are."""
-    place = GaugePlacement(mounting, pose, f"mounting {mounting}", seat)
+    """Ask for the gauges to be placed around the ball, or mounted in a seat; answered when they are."""
+    seat = at.seat if at.phase is Phase.LENGTH else None
+    place = GaugePlacement(at.point, pose, at.station, seat)
     return Question(place, choices=(PLACED,), default=PLACED)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import reduce
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from hexacell.cell.recovery import FailureKind
 from hexacell.kinematics.commanded_motion import RefusedCommand, RefusedCommands
@@ -169,6 +169,10 @@ class RunState:
     def with_set(self, key: SetKey, value: SetState) -> RunState:
         """The state with another content of one set."""
         return replace(self, sets={**self.sets, key: value})
+
+    def with_changed_set(self, key: SetKey, **changes: Any) -> RunState:  # noqa: ANN401 - of these fields
+        """The state in which some fields of one set are others."""
+        return self.with_set(key, replace(self.set(key), **changes))
 
     def without_position(self) -> RunState:
         """The state in which nobody knows where the robot is."""

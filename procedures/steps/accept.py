@@ -1,6 +1,5 @@
 """Accept: a person decides whether a written geometry that did not pass stays."""
 
-from dataclasses import replace
 from typing import ClassVar, Literal
 
 from hexacell.errors import AnswerNeeded
@@ -20,8 +19,7 @@ class ResultAccepted(BaseEvent):
     by: str | None
     asked: bool = True
 
-    def applied_to(self, state: RunState) -> RunState:
-        return replace(state, accepted=self)
+    kept_as: ClassVar[str] = "accepted"
 
 
 class Accept(StepWithoutMotion):

@@ -17,13 +17,19 @@ from procedures.run.state import RunState
 
 
 class BaseEvent(Frozen):
-    """Something that happened in a run."""
+    """Something that happened in a run.
+
+    ``kept_as`` is the field of the state that keeps the latest event of the class, if it has one.
+    """
 
     kind: str
 
+    kept_as: ClassVar[str] = ""
+
     def applied_to(self, state: RunState) -> RunState:
         """The state after the event; one without a rule of its own is kept as the latest of its class."""
-        return replace(state, others={**state.others, type(self): self})
+        others = {**state.others, type(self): self}
+        return replace(state, **({self.kept_as: self} if self.kept_as else {"others": others}))
 
     def text(self, state: RunState) -> str | None:
         """What it reports, None if nothing; ``state`` includes the event."""

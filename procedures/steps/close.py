@@ -1,6 +1,5 @@
 """Close: the reference of a set is read again at its end; the difference is drift."""
 
-from dataclasses import replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -29,23 +28,17 @@ class SetClosed(EventOfSet):
     reason: str = ""
 
     def applied_to(self, state: RunState) -> RunState:
-        return state.with_set(
-            self.at, replace(state.set(self.at), drift_mm=self.drift_mm, closing=self.reading)
-        )
+        return state.with_changed_set(self.at, drift_mm=self.drift_mm, closing=self.reading)
 
     def text(self, state: RunState) -> str:
         samples = state.set(self.at).samples
         largest = max(float(np.abs(sample.deviation_mm).max()) for sample in samples)
         drift = float(np.abs(self.drift_mm).max())
         unit = unit_of(largest, drift)
-        line = (
-            f"{self.at.name:24} {len(samples):2} records, "
-            f"largest deviation {unit.length(largest)}, drift {unit.length(drift)}"
-        )
+        end = f"\n{self.at.name} ends with {len(samples)} records: {self.reason}" if self.reason else ""
         return (
-            f"{line}\n{self.at.name} ends with {len(samples)} records: {self.reason}"
-            if self.reason
-            else line
+            f"{self.at.name:24} {len(samples):2} records, "
+            f"largest deviation {unit.length(largest)}, drift {unit.length(drift)}{end}"
         )
 
 

@@ -7,7 +7,7 @@ imported, so that this is the namespace in which other packages name all of them
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Literal, Self, Union
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self, Union
 
 from pydantic import Field
 
@@ -224,8 +224,7 @@ class Ended(BaseEvent):
     line: str
     displacement: TaskDisplacement | None = None
 
-    def applied_to(self, state: RunState) -> RunState:
-        return replace(state, ended=self)
+    kept_as: ClassVar[str] = "ended"
 
 
 _COURSE: tuple[type[BaseEvent], ...] = (

@@ -1,6 +1,5 @@
 """Identify: the geometry is identified from the records, and the held-out poses are chosen."""
 
-from dataclasses import replace
 from typing import ClassVar, Literal
 
 from hexacell.checks.quick_level import QuickAccuracy
@@ -38,8 +37,7 @@ class Identified(BaseEvent):
     quick: QuickAccuracy | None = None
     reversal: Reversal | None = None
 
-    def applied_to(self, state: RunState) -> RunState:
-        return replace(state, identified=self)
+    kept_as: ClassVar[str] = "identified"
 
 
 class Identify(Computation):

@@ -32,8 +32,7 @@ class ConfirmationPlanned(BaseEvent):
     reason: str
     poses: tuple[tuple[SixNumbers, ...], ...]
 
-    def applied_to(self, state: RunState) -> RunState:
-        return replace(state, confirmation=self)
+    kept_as: ClassVar[str] = "confirmation"
 
     def text(self, state: RunState) -> str:
         return f"{self.reason}: {sum(map(len, self.poses))} new records show whether by chance"
@@ -53,8 +52,7 @@ class ResultValidated(BaseEvent):
     check: CheckResult | None = None
     length: LengthStatement | None = None
 
-    def applied_to(self, state: RunState) -> RunState:
-        return replace(state, judged=self)
+    kept_as: ClassVar[str] = "judged"
 
 
 class Judge(Computation):

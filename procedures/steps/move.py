@@ -20,6 +20,7 @@ from procedures.run.state import RunState
 from procedures.run.trips import Guard, GuardTripped, WatchedSet
 from procedures.steps.base import BaseEvent, EventAtPose, StepAtPose
 from procedures.steps.identify import Identified
+from procedures.steps.place import are_fixed
 from procedures.steps.sample import RecordRejected
 
 OFF_THE_PLATE = {Guard.GAUGE_END, Guard.PLATE}
@@ -43,7 +44,7 @@ class Arrived(EventAtPose):
         """The gauges of all other open sets may be carried away now."""
         is_waypoint = self.orientation == 0
         if self.orientation != 1 and self.at in state.sets:
-            state = state.with_set(self.at, replace(state.set(self.at), has_left=True))
+            state = state.with_changed_set(self.at, has_left=True)
         arrived = replace(
             state,
             at_pose=None if is_waypoint else (self.at, self.orientation),
@@ -94,9 +95,8 @@ class PoseExcluded(EventAtPose):
         left = replace(state, excluded=(*state.excluded, self), identified=self._with_replacements(state))
         if self.at not in state.sets:
             return left
-        measured = state.set(self.at)
-        again = tuple(pair for pair in measured.again if pair[1] != self.pose)
-        return left.with_set(self.at, replace(measured, again=again))
+        again = tuple(pair for pair in state.set(self.at).again if pair[1] != self.pose)
+        return left.with_changed_set(self.at, again=again)
 
     def _with_replacements(self, state: RunState) -> Identified | None:
         """The identification with other held-out poses in the place of those that cannot be commanded."""
@@ -236,9 +236,5 @@ def gauges_are_at_ball(settings: CellSettings, at: SetKey, state: RunState) -> b
     Where they are fixed they stand at every point. Placed by hand, they stand around the ball from then
     until the robot has left their point, and at any open set that it may be in.
     """
-    if at.phase is Phase.LENGTH and settings.length_check is not None:
-        are_fixed = settings.length_check.mounting == "fixed"
-    else:
-        are_fixed = settings.stations.placement == "fixed"
     left = [] if state.at_pose is None else [state.at_pose[0]]
-    return are_fixed or any(state.set(key).placed for key in (at, *left, *state.open_sets))
+    return are_fixed(settings, at) or any(state.set(key).placed for key in (at, *left, *state.open_sets))

@@ -1,6 +1,5 @@
 """Pilot: the gauges are read where the reference was left, which steers the choice of poses."""
 
-from dataclasses import replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -26,8 +25,8 @@ class PilotTaken(EventAtPose):
 
     def applied_to(self, state: RunState) -> RunState:
         measured = state.set(self.at)
-        pilots = (*measured.pilots, self)
-        return state.with_set(self.at, replace(measured, pilots=pilots, piloted=measured.piloted + 1))
+        pilots, piloted = (*measured.pilots, self), measured.piloted + 1
+        return state.with_changed_set(self.at, pilots=pilots, piloted=piloted)
 
 
 class Pilot(StepAtPose):

@@ -1,13 +1,13 @@
 """Place: the gauges are put around the ball, by a person unless they are fixed."""
 
-from dataclasses import replace
 from typing import ClassVar, Literal
 
+from hexacell.cell.model import CellSettings
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
 from procedures.resources.run_resources import RunResources
-from procedures.run.keys import Phase, SixNumbers
-from procedures.run.questions import ask_mounting, ask_placement
+from procedures.run.keys import Phase, SetKey, SixNumbers
+from procedures.run.questions import ask_placement
 from procedures.run.state import RunState
 from procedures.steps.base import EventOfSet, StepOfSet
 
@@ -22,7 +22,7 @@ class GaugesPlaced(EventOfSet):
     kind: Literal["placed"] = "placed"
 
     def applied_to(self, state: RunState) -> RunState:
-        return state.with_set(self.at, replace(state.set(self.at), placed=True))
+        return state.with_changed_set(self.at, placed=True)
 
 
 class Place(StepOfSet):
@@ -36,10 +36,13 @@ class Place(StepOfSet):
 
     async def perform(self, run: RunResources, state: RunState) -> GaugesPlaced:
         """Ask a person where one is needed; the robot stands still meanwhile."""
-        settings, pose = run.settings, Pose(*self.pose)
-        if self.at.phase is Phase.LENGTH and settings.length_check is not None:
-            if settings.length_check.mounting == "by-hand":
-                await run.ask_at_standstill(ask_mounting(self.at.point, self.at.seat, pose))
-        elif settings.stations.placement == "by-hand":
-            await run.ask_at_standstill(ask_placement(self.at, pose))
+        if not are_fixed(run.settings, self.at):
+            await run.ask_at_standstill(ask_placement(self.at, Pose(*self.pose)))
         return GaugesPlaced(at=self.at)
+
+
+def are_fixed(settings: CellSettings, at: SetKey) -> bool:
+    """Whether nobody has to bring the gauges of a set to the ball."""
+    if at.phase is Phase.LENGTH and settings.length_check is not None:
+        return settings.length_check.mounting == "fixed"
+    return settings.stations.placement == "fixed"

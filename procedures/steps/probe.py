@@ -1,6 +1,5 @@
 """Probe: the gauges are read beside a set's reference, after a small known move of the ball."""
 
-from dataclasses import replace
 from typing import ClassVar, Literal
 
 from procedures.resources.run_resources import RunResources
@@ -18,8 +17,7 @@ class GaugesProbed(EventOfSet):
     reading: Reading
 
     def applied_to(self, state: RunState) -> RunState:
-        measured = state.set(self.at)
-        return state.with_set(self.at, replace(measured, probes=(*measured.probes, self)))
+        return state.with_changed_set(self.at, probes=(*state.set(self.at).probes, self))
 
 
 class Probe(StepOfSet):

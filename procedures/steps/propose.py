@@ -1,6 +1,5 @@
 """Propose: the new config is prepared in the run folder, and the gates for writing it are evaluated."""
 
-from dataclasses import replace
 from typing import ClassVar, Literal
 
 from hexacell.cell.fields import GeometryDocument
@@ -25,8 +24,7 @@ class Proposed(BaseEvent):
     displacement: TaskDisplacement | None = None
     corrections: Corrections | None = None
 
-    def applied_to(self, state: RunState) -> RunState:
-        return replace(state, proposed=self)
+    kept_as: ClassVar[str] = "proposed"
 
 
 class Propose(Computation):

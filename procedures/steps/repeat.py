@@ -1,6 +1,5 @@
 """Repeat: a set's reference is read again from another direction, which shows how well it repeats."""
 
-from dataclasses import replace
 from typing import ClassVar, Literal
 
 from procedures.resources.run_resources import RunResources
@@ -16,9 +15,8 @@ class ReferenceRepeated(EventOfSet):
     reading: Reading
 
     def applied_to(self, state: RunState) -> RunState:
-        measured = state.set(self.at)
-        visits = (*measured.visits, self)
-        return state.with_set(self.at, replace(measured, visits=visits, has_left=False, piloted=0))
+        visits = (*state.set(self.at).visits, self)
+        return state.with_changed_set(self.at, visits=visits, has_left=False, piloted=0)
 
 
 class Repeat(StepOfSet):

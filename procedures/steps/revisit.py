@@ -22,7 +22,7 @@ class ReferenceConfirmed(EventOfSet):
     reading: Reading
 
     def applied_to(self, state: RunState) -> RunState:
-        return state.with_set(self.at, replace(state.set(self.at), reference_unverified=False))
+        return state.with_changed_set(self.at, reference_unverified=False)
 
     def text(self, state: RunState) -> str:
         return f"{self.at.name} continues: its reference is unchanged"

@@ -36,7 +36,7 @@ class RecordTaken(EventAtPose):
         measured = state.set(self.at)
         again = tuple(pair for pair in measured.again if pair[0] != self.orientation)
         samples = (*measured.samples, self)
-        return state.with_set(self.at, replace(measured, samples=samples, again=again, has_left=False))
+        return state.with_changed_set(self.at, samples=samples, again=again, has_left=False)
 
 
 class RecordRejected(EventOfSet):

@@ -1,6 +1,5 @@
 """Standstill: all devices are read again and again while nothing moves, which shows their noise."""
 
-from dataclasses import replace
 from typing import ClassVar, Literal
 
 from procedures.resources.run_resources import RunResources
@@ -17,7 +16,7 @@ class StandstillRead(ReadingSeries, BaseEvent):
     at: SetKey
 
     def applied_to(self, state: RunState) -> RunState:
-        return state.with_set(self.at, replace(state.set(self.at), standstill=self))
+        return state.with_changed_set(self.at, standstill=self)
 
 
 class Standstill(StepOfSet):

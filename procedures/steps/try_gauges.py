@@ -1,7 +1,6 @@
 """Try: back at a set's reference it is judged whether each gauge followed the ball."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -60,7 +59,7 @@ class GaugesTried(EventOfSet):
 
     def applied_to(self, state: RunState) -> RunState:
         """The set's gauges need no other trial until they are unwatched."""
-        return state.with_set(self.at, replace(state.set(self.at), tried=True, has_left=False))
+        return state.with_changed_set(self.at, tried=True, has_left=False)
 
 
 class Try(StepOfSet):

@@ -7,15 +7,13 @@ measured again afterwards, for the comparison.
 from dataclasses import dataclass
 
 from hexacell.errors import LimitError
-from hexacell.kinematics.rotations import Array
 from procedures.run.keys import Phase, SetKey, SixNumbers
 from procedures.run.state import RunState
 from procedures.steps.judge import Judge
 from procedures.steps.locate import Locate
 from procedures.steps.move import Move
 from procedures.steps.registry import Step
-from procedures.workflow.sets import SetSteps, TravelError, reference_move, reference_pose, require_zero
-from procedures.workflow.trial import TrialSteps
+from procedures.workflow.sets import SetSteps, TravelError, reference_move, require_zero
 
 BY_CHANCE = 3
 """Rejected poses of a set that a machine that does not repeat may have; each is measured again."""
@@ -27,7 +25,6 @@ class HeldOutSteps:
 
     point_count: int
     sets: SetSteps
-    trials: TrialSteps
 
     def next_step(self, state: RunState, phase: Phase) -> Step | None:
         """The next step of the first set that is not closed; None if all are."""
@@ -39,7 +36,7 @@ class HeldOutSteps:
 
     def way_back(self, state: RunState, key: SetKey) -> Step:
         """The next move to the reference of a set; raises ``HexacellError`` if no safe path leads there."""
-        is_in_order = self.sets.paths.is_in_order(state, key)
+        is_in_order = self.sets.is_in_order(state, key)
         return reference_move(state, key) if is_in_order else self._to_reference(state, key)
 
     def _poses(self, state: RunState, key: SetKey) -> tuple[tuple[SixNumbers, ...], int]:
@@ -66,10 +63,8 @@ class HeldOutSteps:
                 return step
         elif measured.rejections > self._rejections_by_chance:
             raise TravelError(f"{key}: the ball left the gauges' travel at a held-out pose")
-        if measured.reference_unverified:
-            return self.sets.at_or_to_reference(state, key, self._ball(state, key))
-        if measured.samples and (trial := self.trials.next_step(state, key, self._ball(state, key))):
-            return trial
+        if step := self.sets.due_first(state, key, self.sets.ball_at_reference(state, key)):
+            return step
         if (orientation := self._next_orientation(state, key)) is not None:
             here = self.sets.at_pose(state, key, orientation)
             return here or self._to_pose(state, key, orientation)
@@ -81,7 +76,7 @@ class HeldOutSteps:
     @property
     def _rejections_by_chance(self) -> int:
         """How many poses of a set the ball may leave the travel at although they were chosen inside it."""
-        return BY_CHANCE if self.trials.allowances.scatters else 0
+        return BY_CHANCE if self.sets.allowances.scatters else 0
 
     def _next_orientation(self, state: RunState, key: SetKey) -> int | None:
         """The lowest one without a record that the controller does not refuse; None if there is none."""
@@ -94,13 +89,13 @@ class HeldOutSteps:
         poses, common = self._poses(state, key)
         move = Move(at=key, orientation=orientation, pose=poses[orientation - 1])
         if orientation == 1:
-            return self.sets.paths.towards(state, move)
+            return self.sets.towards(state, move)
         # Each list of poses was chosen with safe lines from one to the next, replacements apart.
         replacements = {new for refused in state.excluded for _, new in refused.replacements}
         is_as_chosen = not replacements & {move.pose, state.target}
         if is_as_chosen and state.at_pose == (key, orientation - 1) and orientation != common + 1:
             return move
-        return self.sets.paths.towards(state, move, self._ball(state, key))
+        return self.sets.towards(state, move, self.sets.ball_at_reference(state, key))
 
     def _after_rejection(self, state: RunState, key: SetKey) -> Step | None:
         """What follows when the ball has left the travel with the new geometry; None if its pose is next.
@@ -115,7 +110,7 @@ class HeldOutSteps:
         if not measured.reference_unverified:
             return None
         try:
-            return self.sets.at_or_to_reference(state, key, self._ball(state, key))
+            return self.sets.at_or_to_reference(state, key, self.sets.ball_at_reference(state, key))
         except LimitError:
             return Judge()
 
@@ -134,8 +129,4 @@ class HeldOutSteps:
             return None
 
     def _to_reference(self, state: RunState, key: SetKey) -> Move:
-        return self.sets.to_reference(state, key, self._ball(state, key))
-
-    def _ball(self, state: RunState, key: SetKey) -> Array | None:
-        """Where the ball is at the set's reference (3,), mm, by what is known now."""
-        return self.sets.paths.ball_at(state, reference_pose(state, key))
+        return self.sets.to_reference(state, key, self.sets.ball_at_reference(state, key))

@@ -19,7 +19,6 @@ from procedures.steps.locate import Locate
 from procedures.steps.move import Move
 from procedures.steps.registry import Step
 from procedures.workflow.sets import NoSafePath, SetSteps, TravelError
-from procedures.workflow.trial import TrialSteps
 
 BESIDE_MM = np.array([1.0, -0.8, 0.6])
 """From the middle of a seat to the record beside it: no two gauges see the same."""
@@ -31,7 +30,6 @@ class LengthSteps:
 
     fixture: LengthCheckSettings
     sets: SetSteps
-    trials: TrialSteps
 
     def next_step(self, state: RunState) -> Step | None:
         """The next step of the first mounting that is not closed; None if all are."""
@@ -63,13 +61,11 @@ class LengthSteps:
                 action="Check first_seat, direction and distance_mm in [length_check], and how the fixture "
                 "lies; then mount the gauges there again",
             )
-        if not measured.reference_unverified and (
-            trial := self.trials.next_step(state, key, self._zero(state, key))
-        ):
-            return trial
-        orientation = measured.next_orientation
-        if measured.reference_unverified or orientation > self._records:
-            return self.sets.at_or_to_reference(state, key, self._zero(state, key))
+        zero = self._zero(state, key)
+        if step := self.sets.due_first(state, key, zero):
+            return step
+        if (orientation := measured.next_orientation) > self._records:
+            return self.sets.at_or_to_reference(state, key, zero)
         samples = measured.samples  # where the seat is beside its stated place, by the first reading in it
         is_known = key.point != 1 and bool(samples)
         off = BESIDE_MM - np.array(samples[0].deviation_mm) if is_known else np.zeros(3)
@@ -81,7 +77,7 @@ class LengthSteps:
                 action="Lower tilt_deg in [length_check], or put the fixture elsewhere",
             )
         here = self.sets.at_pose(state, key)
-        return here or self.sets.paths.towards(state, move, self._zero(state, key))
+        return here or self.sets.towards(state, move, zero)
 
     def _pose(self, key: SetKey, orientation: int, off_mm: Array) -> Pose:
         """A pose of a mounting whose seat is ``off_mm`` (3,) from where the cell file has it."""
@@ -96,5 +92,4 @@ class LengthSteps:
 
     def _zero(self, state: RunState, key: SetKey) -> Array | None:
         """Where the ball is (3,), mm, with the gauges at zero, by what is known now."""
-        _, zero = self.sets.paths.known(state, key)
-        return zero
+        return self.sets.known(state, key)[1]

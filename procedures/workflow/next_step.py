@@ -31,7 +31,6 @@ from procedures.workflow.held_out import HeldOutSteps
 from procedures.workflow.length import LengthSteps
 from procedures.workflow.points import IdentificationSteps, NoiseSteps
 from procedures.workflow.sets import SetSteps
-from procedures.workflow.trial import TrialSteps
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,13 +80,13 @@ class Measuring:
     """The stages that measure, for the geometries that command the robot of a plan."""
 
     def __init__(self, plan: Plan, allowances: Allowances) -> None:
-        sets, settings = SetSteps(plan.robot), plan.settings
-        trials = TrialSteps(settings.stations.trial_mm, sets, allowances)
-        self.points = IdentificationSteps(plan, sets, NoiseSteps(plan, sets), trials)
-        self.held_out = HeldOutSteps(len(settings.verification.points), sets, trials)
-        self.approach = Approach.of(settings, sets.paths, allowances.stops)
+        settings = plan.settings
+        sets = SetSteps(plan.robot, settings.stations.trial_mm, allowances)
+        self.points = IdentificationSteps(plan, sets, NoiseSteps(plan, sets))
+        self.held_out = HeldOutSteps(len(settings.verification.points), sets)
+        self.approach = Approach.of(settings, sets, allowances.stops)
         fixture = settings.length_check
-        self.length = None if fixture is None else LengthSteps(fixture, sets, trials)
+        self.length = None if fixture is None else LengthSteps(fixture, sets)
 
     def length_step(self, state: RunState) -> BaseStep | None:
         """The next step of the length check; None when it is done."""

@@ -29,7 +29,6 @@ from procedures.steps.registry import Step
 from procedures.steps.repeat import Repeat
 from procedures.steps.standstill import Standstill
 from procedures.workflow.sets import Known, SetSteps, beside, move_to_chosen, reference_pose, require_zero
-from procedures.workflow.trial import TrialSteps
 
 DISTANCE_SHARE = 0.3
 """How far the robot leaves the reference, level as it is, as a share of the gauges' travel."""
@@ -107,7 +106,6 @@ class IdentificationSteps:
     plan: Plan
     sets: SetSteps
     noise: NoiseSteps
-    trials: TrialSteps
 
     def next_step(self, state: RunState) -> Step | None:
         """The next step; None if nothing more is to be measured."""
@@ -120,7 +118,7 @@ class IdentificationSteps:
                     return Lend()
                 at = SetKey(phase=Phase.IDENTIFY, point=start.point)
                 move = Move(at=at, orientation=1, pose=start.pose.as_tuple())
-                return Locate() if state.position_unknown else self.sets.paths.towards(state, move)
+                return Locate() if state.position_unknown else self.sets.towards(state, move)
             case MeasurePose() as pose:
                 return move_to_chosen(state, pose)
             case FinishPoint() as finish:
@@ -134,10 +132,8 @@ class IdentificationSteps:
         if state.position_unknown:
             return Locate()
         require_zero(state, key)
-        if measured.reference_unverified:
-            return self.sets.at_or_to_reference(state, key, self._ball(state, key))
-        if trial := self.trials.next_step(state, key, self._ball(state, key)):
-            return trial
+        if step := self.sets.due_first(state, key, self._ball(state, key)):
+            return step
         measuring_noise = self.noise.next_step(state, key, self._known(state, key))
         # With several records to be taken again, one is, before the robot moves to the next of them.
         orientation, pose = measured.again[0] if measured.again else (None, None)
@@ -146,7 +142,7 @@ class IdentificationSteps:
         if orientation is None or pose is None:
             return None
         move = Move(at=key, orientation=orientation, pose=pose)
-        return self.sets.paths.towards(state, move, self._ball(state, key))
+        return self.sets.towards(state, move, self._ball(state, key))
 
     def _applies_provisional(self, state: RunState) -> bool:
         """Whether the controller gets a provisional geometry now, between two points."""

@@ -1,8 +1,16 @@
-"""The steps within a set of poses and the moves between them: along checked straight lines, or none."""
+"""The steps within a set of poses and the moves between them: along checked straight lines, or none.
+
+The gauges of a set are tried whenever they were placed or connected again. From the recorded reference the
+ball is moved a millimetre along each axis of the base, and the gauges are read. Back at the reference it is
+judged whether each of them follows the ball on its axis, with its sign and scale
+(:mod:`hexacell.noise.gauge_trial`). Where they seem not to, the moves are repeated, twice as far each time
+as long as the gauges' travel allows. Only then is anything else measured.
+"""
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
@@ -15,21 +23,28 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.motion.path_check import ball_position, is_clear
 from hexacell.motion.paths import PathPlanner, find_route, next_return_move
+from hexacell.noise.allowances import Allowances
+from hexacell.noise.gauge_trial import AXES
 from hexacell.robot.model import Robot
 from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
-from procedures.run.state import RunState
+from procedures.run.state import RunState, SetState
 from procedures.steps.close import CloseSet
 from procedures.steps.move import Expectation, Move
 from procedures.steps.place import Place
+from procedures.steps.probe import Probe
 from procedures.steps.registry import Step
 from procedures.steps.revisit import Revisit
 from procedures.steps.sample import Sample
+from procedures.steps.try_gauges import Try, trial_of
 
 Known = tuple[RobotBelief, GaugeZero]
 """What is known of the robot, and where the ball was when a set's gauges were zeroed."""
 
 ELSEWHERE = 3.0
 """The gauges are surely not at a ball that is farther from their zero than so many times their room."""
+
+FARTHEST_SHARE = 0.3
+"""Length of the largest moves by which gauges are tried, as a share of their travel."""
 
 
 class TravelError(LimitError):
@@ -41,10 +56,84 @@ class NoSafePath(LimitError):
 
 
 @dataclass(frozen=True, eq=False)
-class RunPathPlanner:
-    """Plans the moves of one robot."""
+class SetSteps:
+    """Decides on the steps of the sets of one robot, and plans its moves.
+
+    ``trial_mm`` is the length of a move by which the gauges are tried, 0 for no trial.
+    """
 
     robot: Robot
+    trial_mm: float
+    allowances: Allowances
+
+    def due_first(self, state: RunState, key: SetKey, ball: Array | None) -> Step | None:
+        """What an open set needs before anything else is measured; None if it needs nothing.
+
+        ``ball`` (3,), mm, is where the ball was when the gauges were zeroed, if that is known.
+
+        Raises:
+            LimitError: the gauges are to be tried, and no small move is possible.
+        """
+        if state.set(key).reference_unverified:
+            return self.at_or_to_reference(state, key, ball)
+        return self._trial(state, key, ball)
+
+    def at_pose(self, state: RunState, key: SetKey, orientation: int | None = None) -> Step | None:
+        """Place the gauges or sample, if the robot is at an orientation: by default the lowest missing."""
+        orientation = orientation or state.set(key).next_orientation
+        if state.at_pose != (key, orientation) or state.target is None:
+            return None
+        if orientation == 1 and not state.set(key).placed:
+            return Place(at=key, pose=state.target)
+        return Sample(at=key, orientation=orientation, pose=state.target)
+
+    def at_reference(self, state: RunState, key: SetKey) -> Step | None:
+        """Verify the set's reference, or close the set, if the robot is there."""
+        if state.at_pose != (key, 1):
+            return None
+        return Revisit(at=key) if state.set(key).reference_unverified else CloseSet(at=key)
+
+    def at_or_to_reference(self, state: RunState, key: SetKey, ball: Array | None) -> Step:
+        """What is due at the set's reference, or the move there."""
+        return self.at_reference(state, key) or self.to_reference(state, key, ball)
+
+    def to_reference(self, state: RunState, key: SetKey, ball: Array | None) -> Move:
+        """Move to the set's reference by a checked path.
+
+        ``ball`` (3,), mm, is where the ball was when the gauges were zeroed, if that is known.
+        """
+        move = reference_move(state, key)
+        if not state.refused.allows(move.pose):
+            raise NoSafePath(
+                f"{key}: the controller refuses its reference {move.target}, to which it must return",
+                action="Widen the limits of the controller, then continue",
+            )
+        return self.towards(state, move, ball)
+
+    def is_clear_both_ways(
+        self, belief: RobotBelief, reference: SixNumbers, pose: SixNumbers, ball: Array | None
+    ) -> bool:
+        """Whether the robot gets from a reference to a pose and back within the limits."""
+        here, there = (self.robot.from_commands([Pose(*one)]) for one in (reference, pose))
+        return is_clear(belief, here, there, ball) and is_clear(belief, there, here, ball)
+
+    def way_back(self, state: RunState, key: SetKey, known: Known | None) -> Move:
+        """The next move to the reference of a set; raises ``HexacellError`` if no safe path leads there.
+
+        It leads along the path on which the robot came. Where something is ``known`` that is shortened
+        (:func:`hexacell.motion.paths.next_return_move`).
+        """
+        visited = state.path_from_reference
+        if len(visited) < 2 or state.target != visited[-1][1] or visited[0][1] != state.set(key).pose(1):
+            return self.to_reference(state, key, None if known is None else known[1].reference)
+        moves = [Move(at=key, orientation=orientation, pose=pose) for orientation, pose in visited[:-1]]
+        if known is None or len(moves) == 1:
+            return moves[-1]
+        belief, zero = known
+        commands = self.robot.from_commands(Pose(*pose) for _, pose in visited)
+        departure = max(row for row, (orientation, _) in enumerate(visited) if orientation)
+        move = next_return_move(belief, zero.reference, commands, departure)
+        return moves[move] if isinstance(move, int) else self._waypoint(key, move)
 
     def is_in_order(self, state: RunState, key: SetKey) -> bool:
         """Whether the robot came by the set's own moves, each of which was checked when it was chosen."""
@@ -95,25 +184,6 @@ class RunPathPlanner:
             action="Bring it near that pose with its own controller, then continue",
         )
 
-    def back(
-        self, state: RunState, key: SetKey, known: tuple[RobotBelief, GaugeZero] | None
-    ) -> Move | None:
-        """The next move back to a set's reference by the path on which the robot came; None if it did not.
-
-        Where something is ``known`` the path is shortened (:func:`hexacell.motion.paths.next_return_move`).
-        """
-        visited = state.path_from_reference
-        if len(visited) < 2 or state.target != visited[-1][1] or visited[0][1] != state.set(key).pose(1):
-            return None
-        moves = [Move(at=key, orientation=orientation, pose=pose) for orientation, pose in visited[:-1]]
-        if known is None or len(moves) == 1:
-            return moves[-1]
-        belief, zero = known
-        commands = self.robot.from_commands(Pose(*pose) for _, pose in visited)
-        departure = max(row for row, (orientation, _) in enumerate(visited) if orientation)
-        move = next_return_move(belief, zero.reference, commands, departure)
-        return moves[move] if isinstance(move, int) else self._waypoint(key, move)
-
     def known(self, state: RunState, key: SetKey) -> tuple[RobotBelief, Array | None]:
         """The robot, and where its ball is (3,), mm, with a set's gauges at zero; None before they are."""
         belief, samples = self._belief(state).zeroed_at(state.zero_shown(key)), state.set(key).samples
@@ -122,9 +192,10 @@ class RunPathPlanner:
             return belief, None
         return belief, ball - self.robot.frames.base @ np.array(samples[0].deviation_mm)
 
-    def ball_at(self, state: RunState, pose: SixNumbers) -> Array | None:
-        """The estimated position (3,), mm, of the ball at a commanded pose."""
-        return ball_position(self._belief(state), self.command(pose))
+    def ball_at_reference(self, state: RunState, key: SetKey) -> Array | None:
+        """The position (3,), mm, of the ball at a set's reference by what is known now; None before."""
+        pose = state.set(key).pose(1)
+        return None if pose is None else ball_position(self._belief(state), self.command(pose))
 
     def _waypoint(self, key: SetKey, command: Pose) -> Move:
         """A move to a pose in the convention's frames at which nothing is measured."""
@@ -145,66 +216,56 @@ class RunPathPlanner:
         free = self.robot.mechanism.convention.free_parameters(geometry)
         return replace(self.robot.belief(), free=np.asarray(free))
 
+    def _trial(self, state: RunState, key: SetKey, ball: Array | None) -> Step | None:
+        """The next step of a trial; None if none is due."""
+        measured = state.set(key)
+        if not self.trial_mm or measured.tried or not measured.samples:
+            return None
+        rounds, axis = divmod(len(measured.probes), AXES)
+        if rounds and axis == 0 and self._decides(measured, rounds):
+            is_back = state.at_pose == (key, 1)
+            return Try(at=key) if is_back else self.to_reference(state, key, ball)
+        moved = self._moved(state, key, axis, self._distances[rounds])
+        pose = beside(reference_pose(state, key), moved)
+        if state.off_plan and state.target == pose:
+            return Probe(at=key, moved_mm=moved)
+        probed = [beside(reference_pose(state, key), probe.moved_mm) for probe in measured.probes[-1:]]
+        is_beside = state.off_plan and not state.position_unknown and state.target in probed
+        if state.at_pose != (key, 1) and not is_beside:
+            return self.to_reference(state, key, ball)
+        return Move(at=key, orientation=0, pose=pose)
+
+    @cached_property
+    def _distances(self) -> tuple[float, ...]:
+        """Lengths of the moves of each round; at the largest there are two."""
+        farthest = max(self.trial_mm, FARTHEST_SHARE * self.robot.limits.room.smallest_mm)
+        doublings = int(np.log2(farthest / self.trial_mm))
+        smaller = [self.trial_mm * 2.0**doubling for doubling in range(doublings + 1)]
+        return (*smaller, farthest, farthest)
+
+    def _decides(self, measured: SetState, rounds: int) -> bool:
+        """Whether so many rounds decide: the gauges are as they should be, or there is no larger move."""
+        return rounds >= len(self._distances) or not trial_of(self.allowances, measured).findings
+
+    def _moved(self, state: RunState, key: SetKey, axis: int, farthest_mm: float) -> ThreeNumbers:
+        """The move along an axis, to the side on which there is room, as far as there is."""
+        belief = self.robot.belief().zeroed_at(state.zero_shown(key))  # the robot as it was drawn
+        reference = reference_pose(state, key)
+        ball = ball_position(belief, self.robot.from_commands([Pose(*reference)]))
+        for distance, side in product(dict.fromkeys((farthest_mm, self.trial_mm)), (1.0, -1.0)):
+            x, y, z = (side * distance * np.eye(AXES)[axis]).tolist()
+            if self.is_clear_both_ways(belief, reference, beside(reference, (x, y, z)), ball):
+                return (x, y, z)
+        raise LimitError(
+            f"{key}: the gauges cannot be tried, because the robot cannot move by {self.trial_mm:g} mm "
+            f"along {'xyz'[axis]} there within its limits",
+            action="Choose another point, or a smaller trial_mm in [stations]",
+        )
+
 
 def _is_inside(belief: RobotBelief, command: PoseBatch, reference: Array, share: float = 1.0) -> bool:
     ball = ball_position(belief, command)
     return ball is not None and bool(belief.limits.within_travel(ball - reference, share=share))
-
-
-@dataclass(frozen=True, eq=False)
-class SetSteps:
-    """Steps of the sets of one robot."""
-
-    robot: Robot
-
-    @cached_property
-    def paths(self) -> RunPathPlanner:
-        """How to get to a pose from wherever the robot is."""
-        return RunPathPlanner(self.robot)
-
-    def at_pose(self, state: RunState, key: SetKey, orientation: int | None = None) -> Step | None:
-        """Place the gauges or sample, if the robot is at an orientation: by default the lowest missing."""
-        orientation = orientation or state.set(key).next_orientation
-        if state.at_pose != (key, orientation) or state.target is None:
-            return None
-        if orientation == 1 and not state.set(key).placed:
-            return Place(at=key, pose=state.target)
-        return Sample(at=key, orientation=orientation, pose=state.target)
-
-    def at_reference(self, state: RunState, key: SetKey) -> Step | None:
-        """Verify the set's reference, or close the set, if the robot is there."""
-        if state.at_pose != (key, 1):
-            return None
-        return Revisit(at=key) if state.set(key).reference_unverified else CloseSet(at=key)
-
-    def at_or_to_reference(self, state: RunState, key: SetKey, ball: Array | None) -> Step:
-        """What is due at the set's reference, or the move there."""
-        return self.at_reference(state, key) or self.to_reference(state, key, ball)
-
-    def to_reference(self, state: RunState, key: SetKey, ball: Array | None) -> Move:
-        """Move to the set's reference by a checked path.
-
-        ``ball`` (3,), mm, is where the ball was when the gauges were zeroed, if that is known.
-        """
-        move = reference_move(state, key)
-        if not state.refused.allows(move.pose):
-            raise NoSafePath(
-                f"{key}: the controller refuses its reference {move.target}, to which it must return",
-                action="Widen the limits of the controller, then continue",
-            )
-        return self.paths.towards(state, move, ball)
-
-    def is_clear_both_ways(
-        self, belief: RobotBelief, reference: SixNumbers, pose: SixNumbers, ball: Array | None
-    ) -> bool:
-        """Whether the robot gets from a reference to a pose and back within the limits."""
-        here, there = (self.robot.from_commands([Pose(*one)]) for one in (reference, pose))
-        return is_clear(belief, here, there, ball) and is_clear(belief, there, here, ball)
-
-    def way_back(self, state: RunState, key: SetKey, known: Known | None) -> Move:
-        """The next move to the reference of a set; raises ``HexacellError`` if no safe path leads there."""
-        back = self.paths.back(state, key, known)
-        return back or self.to_reference(state, key, None if known is None else known[1].reference)
 
 
 def beside(reference: SixNumbers, moved: ThreeNumbers) -> SixNumbers:

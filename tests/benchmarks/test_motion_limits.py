@@ -17,6 +17,7 @@ from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.config.interface import ControllerGeometry
+from hexacell.config.layout import controller_geometry
 from hexacell.errors import HexacellError, LimitError
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
@@ -25,7 +26,7 @@ from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from hexacell.limits.limits import Limits
 from hexacell.results.written_geometry import as_written
-from hexacell.robot.model import Robot, controller_geometry, make_robot, robot_of
+from hexacell.robot.model import Robot, make_robot, robot_of
 from procedures.calibration.held_out_poses import HeldOutPoses
 from tests.benchmarks.figures import NEVER, at_least, at_most
 from tests.benchmarks.machines import on_all_cores

@@ -13,6 +13,7 @@ import pytest
 from drivers.controllers.linuxcnc.set_pins import _wanted
 from hexacell.cell.loader import load_cell
 from hexacell.config.interface import ControllerGeometry
+from hexacell.config.layout import ConfigLayout
 from hexacell.config.linuxcnc_ini import IniText
 from hexacell.identification.placement import Placement, leg_forces
 from hexacell.kinematics.corrections import Corrections
@@ -20,7 +21,6 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.robot.model import config_layout
 from tests.cli.cell_folder import CONFIGS
 
 FOLDER = CONFIGS / "linuxcnc-hexaglide"
@@ -82,7 +82,7 @@ def compiled(ini: str, folder: Path) -> ctypes.CDLL:
 @pytest.mark.parametrize("corrections", [LOADED, replace(LOADED, weight_centre_mm=None)])
 def test_joints_of_legs_under_a_weight_and_the_way_back(tmp_path: Path, corrections: Corrections) -> None:
     cell = load_cell(FOLDER / "cell.toml")
-    layout, paths, mechanism = config_layout(cell.settings), cell.config_paths, cell.settings.mechanism
+    layout, paths, mechanism = ConfigLayout.of(cell.settings), cell.config_paths, cell.settings.mechanism
     controller = layout.read(*paths)
     [ini] = layout.rewrite([paths[0].read_text()], controller.geometry, corrections)
     component = compiled(ini, tmp_path)

@@ -13,9 +13,9 @@ from hexacell.cell.loader import load_cell
 from hexacell.config.interface import ControllerGeometry
 from hexacell.config.toml_format import native_layout
 from hexacell.errors import FileError
-from hexacell.kinematics.mechanism import FrameTransform, inverse_kinematics
+from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
-from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.pose import FrameTransform, Pose, PoseBatch
 from hexacell.robot.model import make_robot, robot_of
 
 CELL = Path(__file__).parents[2] / "configs" / "simulated-hexaglide.toml"

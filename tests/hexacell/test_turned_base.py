@@ -12,8 +12,7 @@ from hexacell.config.interface import ControllerGeometry
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import Noise
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import FrameTransform
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.pose import FrameTransform, PoseBatch
 from hexacell.measurements.records import MeasurementSet, deviation_of
 from hexacell.robot.model import Robot, make_robot
 from hexacell.robot.virtual_robot import robots_within_tolerances

@@ -11,9 +11,9 @@ from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.interfaces import StartupAction
 from drivers.simulated.followed_controller import FollowedController
 from hexacell.cell.loader import load_cell
+from hexacell.config.layout import ConfigLayout
 from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.robot.model import config_layout
 from tests.linuxcnc.conftest import LinuxCNC, _running
 from tests.linuxcnc_orders import joints_of
 from tests.waiting import wait_until
@@ -43,7 +43,7 @@ async def test_joints_reach_the_same_place_from_either_side(
     for name, value in compensating.environment.items():
         monkeypatch.setenv(name, value)
     cell = load_cell(compensating.folder / "cell.toml")
-    settings, layout = cell.settings, config_layout(cell.settings)
+    settings, layout = cell.settings, ConfigLayout.of(cell.settings)
     assert settings.simulation is not None
     commanding = layout.read(*cell.config_paths)
     there = PoseBatch.of([THERE])

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from hexacell.cell.loader import load_cell
+from hexacell.config.layout import ConfigLayout
 from hexacell.config.linuxcnc_ini import limits_of_ini
-from hexacell.robot.model import config_layout
 from tests.linuxcnc.conftest import LinuxCNC
 from tests.waiting import wait_until
 
@@ -185,7 +185,7 @@ def pins_of_hexapod(machine: LinuxCNC) -> list[float]:
 def written(machine: LinuxCNC) -> list[float]:
     """The geometry of the config."""
     cell = load_cell(machine.folder / "cell.toml")
-    vector: list[float] = config_layout(cell.settings).read(cell.config_path).geometry.vector.tolist()
+    vector: list[float] = ConfigLayout.of(cell.settings).read(cell.config_path).geometry.vector.tolist()
     return vector
 
 

@@ -13,12 +13,11 @@ from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.interfaces import StartupAction
 from hexacell.cell.loader import load_cell
 from hexacell.config.change import propose
-from hexacell.config.layout import fingerprint
+from hexacell.config.layout import ConfigLayout, fingerprint
 from hexacell.config.write_back import commit
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import inverse_kinematics, joint_zeros
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.robot.model import config_layout
 from tests.linuxcnc.conftest import TWO_FILES, LinuxCNC
 from tests.linuxcnc_orders import joints_of, pose_of
 from tests.waiting import wait_until
@@ -72,7 +71,7 @@ async def test_other_zeros_are_read_by_a_restart_in_which_no_motor_moves(
     hexapod, motors, in_its_folder
 ) -> None:
     cell = load_cell(hexapod.folder / "cell.toml")
-    paths, layout, mechanism = cell.config_paths, config_layout(cell.settings), cell.settings.mechanism
+    paths, layout, mechanism = cell.config_paths, ConfigLayout.of(cell.settings), cell.settings.mechanism
     before = layout.read(*paths).geometry
     random = np.random.default_rng(16)
     after = Geometry(before.parameters, np.round(before.vector + random.uniform(-5.0, 5.0, 42), 6))

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from hexacell.cell.loader import load_cell
+from hexacell.config.layout import ConfigLayout
 from hexacell.kinematics.mechanism import inverse_kinematics, joint_zeros
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.robot.model import config_layout
 from tests.configs.test_hexaglidekins import LOADED, loaded_joints
 from tests.linuxcnc.server_client import ServerClient
 from tests.waiting import wait_until
@@ -51,7 +51,7 @@ def with_screws(machine) -> None:
 def with_loaded_legs(machine) -> None:
     """Its legs have play and yield, as its config says."""
     cell = load_cell(machine.folder / "cell.toml")
-    layout, path = config_layout(cell.settings), cell.config_path
+    layout, path = ConfigLayout.of(cell.settings), cell.config_path
     [text] = layout.rewrite([path.read_text()], layout.read(path).geometry, LOADED)
     path.write_text(text)
 
@@ -98,7 +98,7 @@ def test_random_poses_have_the_same_joints(request, name, height, fails, changes
         change(machine)
     machine.start()
     cell = load_cell(machine.folder / "cell.toml")
-    controller = config_layout(cell.settings).read(cell.config_path)
+    controller = ConfigLayout.of(cell.settings).read(cell.config_path)
     mechanism = cell.settings.mechanism
     random = np.random.default_rng(16)
     spans = np.array([60.0, 60.0, 60.0, 20.0, 20.0, 20.0])

@@ -27,8 +27,8 @@ import numpy as np
 from hexacell.kinematics import rotations
 from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Branch, FrameFreedom, FrameTransform, Mechanism
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.mechanism import Branch, FrameFreedom, Mechanism
+from hexacell.kinematics.pose import FrameTransform, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 
 ALIGNMENT_ITERATIONS = 20

@@ -30,8 +30,9 @@ from hexacell.identification.problem.prior import Tolerances
 from hexacell.identification.solver.result import GeometryEstimate
 from hexacell.kinematics import rotations
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import FrameTransform, Mechanism
+from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import ParameterKind
+from hexacell.kinematics.pose import FrameTransform
 from hexacell.kinematics.rotations import Array
 
 SIGNIFICANT_SIGMAS = 3.0

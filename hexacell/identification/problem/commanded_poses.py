@@ -19,9 +19,9 @@ from hexacell.errors import IdentifiabilityError
 from hexacell.identification.problem.prior import Prior
 from hexacell.kinematics.forward import CONTINUATION_STAGES, ForwardResult, continue_solution
 from hexacell.kinematics.geometry import Geometries, Geometry, GeometryBatch
-from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
+from hexacell.kinematics.mechanism import Branch, Mechanism
 from hexacell.kinematics.parameters import LEGS
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.pose import FrameTransform, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 
 SAME_GEOMETRY_STAGES = (1, *CONTINUATION_STAGES)

@@ -15,16 +15,9 @@ import numpy as np
 
 from hexacell.kinematics.geometry import Geometries, GeometriesType, Geometry
 from hexacell.kinematics.legs import Legs
-from hexacell.kinematics.mechanism import (
-    Branch,
-    ConstraintDerivatives,
-    FrameConvention,
-    FrameTransform,
-    Guides,
-    Mechanism,
-)
+from hexacell.kinematics.mechanism import Branch, ConstraintDerivatives, FrameConvention, Guides, Mechanism
 from hexacell.kinematics.parameters import ParameterKind, ParameterSet, ParameterUnit
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.pose import FrameTransform, PoseBatch
 from hexacell.kinematics.rotations import Array
 
 ENCODER_SCALE = ParameterKind(

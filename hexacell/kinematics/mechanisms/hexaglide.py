@@ -15,13 +15,12 @@ from hexacell.kinematics.mechanism import (
     ConstraintDerivatives,
     FrameConvention,
     FrameFreedom,
-    FrameTransform,
     Guides,
     MechanismWords,
 )
 from hexacell.kinematics.mechanisms.jointed_legs import JointedLegs
 from hexacell.kinematics.parameters import MachinePart, ParameterKind, ParameterSet
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.pose import FrameTransform, PoseBatch
 from hexacell.kinematics.rotations import Array
 
 HEXAGLIDE_PARAMETERS = ParameterSet(

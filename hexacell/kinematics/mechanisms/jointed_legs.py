@@ -5,23 +5,31 @@ Here the joints at the base's end are fixed; a mechanism that moves them says wh
 
 import numpy as np
 
+from hexacell.errors import UsageError
 from hexacell.kinematics.geometry import Geometries, Geometry
 from hexacell.kinematics.legs import Legs, axes_through, by_pose
-from hexacell.kinematics.mechanism import ConstraintDerivatives, FrameTransform, Guides, Mechanism
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.mechanism import ConstraintDerivatives, Guides, Mechanism
+from hexacell.kinematics.pose import FrameTransform, PoseBatch
 from hexacell.kinematics.rotations import Array
+
+OPPOSITE_RAD = 3.0
+"""Axes that are farther than this from z are too near its opposite."""
 
 
 class JointedLegs(Mechanism):
     """A mechanism whose constraint is a leg's length less what it should be, mm; stateless.
 
     The parameters of a leg are, in this order, those of its joint at the base's end, others, those of its
-    joint on the platform, and its length. The attributes are the symbols of these kinds.
+    joint on the platform, and its length. The attributes are the symbols of these kinds; ``axis`` is that
+    of two turns that put z along a leg's rail or motor, and ``opposite`` what is wrong where they put it
+    along -z of the convention's base frame, which they can hardly say.
     """
 
     base_joint: str
     platform_joint: str
     length: str
+    axis: str | None = None
+    opposite: str = ""
 
     def base_ends(self, geometry: Geometries, joints: Array) -> Array:
         """The joints at the base's end, (n, 6, 3) or (6, 3), in the base frame, mm."""
@@ -77,7 +85,10 @@ class JointedLegs(Mechanism):
         change = self.convention_frames(geometry)
         moved = self.change_frames(geometry, change)
         # Later code relies on the rules being exact; the rotations satisfy them only to rounding.
-        return self.convention.geometry(self.convention.free_parameters(moved)), change
+        normal = self.convention.geometry(self.convention.free_parameters(moved))
+        if self.axis is not None and np.linalg.norm(normal[self.axis], axis=-1).max() > OPPOSITE_RAD:
+            raise UsageError(self.opposite)
+        return normal, change
 
     def turned(self, geometry: Geometry, change: FrameTransform) -> dict[str, Array]:
         """The further kinds that turns of the base frame change, in other frames."""

@@ -28,16 +28,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from hexacell.errors import UsageError
 from hexacell.kinematics.geometry import Geometries, Geometry
 from hexacell.kinematics.legs import Legs
-from hexacell.kinematics.mechanism import (
-    Branch,
-    FrameConvention,
-    FrameFreedom,
-    FrameTransform,
-    MechanismWords,
-)
+from hexacell.kinematics.mechanism import Branch, FrameConvention, FrameFreedom, MechanismWords
 from hexacell.kinematics.mechanisms.gough_stewart import PLATFORM_JOINT
 from hexacell.kinematics.mechanisms.jointed_legs import JointedLegs
 from hexacell.kinematics.parameters import (
@@ -47,7 +40,7 @@ from hexacell.kinematics.parameters import (
     ParameterSet,
     ParameterUnit,
 )
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.pose import FrameTransform, PoseBatch
 from hexacell.kinematics.rotations import Array, TurnedAxes, turns_of
 
 ROTARY_CRANKS_PARAMETERS = ParameterSet(
@@ -108,9 +101,6 @@ THREE_CENTRES_FRAME = FrameConvention(
     equal=(("platform1z", "platform3z", "platform5z"), ("platform1y", "platform3y")),
 )
 
-OPPOSITE_RAD = 3.0
-"""Axes that are farther than this from base z are too near its opposite."""
-
 
 class RotaryCranks(JointedLegs):
     """6-RUS."""
@@ -120,7 +110,8 @@ class RotaryCranks(JointedLegs):
     parameters = ROTARY_CRANKS_PARAMETERS
     convention = THREE_CENTRES_FRAME
     frame_freedom = FrameFreedom(size=True)
-    base_joint, platform_joint, length = "centre", "platform", "rod"
+    base_joint, platform_joint, length, axis = "centre", "platform", "rod", "axis"
+    opposite = "the axis of a motor points downward from the centres 1, 3 and 5"
 
     def base_ends(self, geometry: Geometries, joints: Array) -> Array:
         axes, (cosine, sine) = TurnedAxes.by(geometry["axis"]), _cosine_and_sine(geometry, joints)
@@ -153,12 +144,6 @@ class RotaryCranks(JointedLegs):
         cosine, sine = _cosine_and_sine(geometry, joints)
         beyond = sine[..., 0] * across[..., 0] - cosine[..., 0] * across[..., 1]
         return np.where(beyond < 0.0, -1, 1)
-
-    def normalize_frames(self, geometry: Geometry) -> tuple[Geometry, FrameTransform]:
-        normal, change = super().normalize_frames(geometry)
-        if np.linalg.norm(normal["axis"], axis=-1).max() > OPPOSITE_RAD:
-            raise UsageError("the axis of a motor points downward from the centres 1, 3 and 5")
-        return normal, change
 
     def turned(self, geometry: Geometry, change: FrameTransform) -> dict[str, Array]:
         before = TurnedAxes.by(geometry["axis"])

@@ -27,18 +27,11 @@ import numpy as np
 from hexacell.errors import UsageError
 from hexacell.kinematics.geometry import Geometries, Geometry
 from hexacell.kinematics.legs import CLOSEST_JOINTS_MM, axes_through
-from hexacell.kinematics.mechanism import (
-    Branch,
-    FrameConvention,
-    FrameFreedom,
-    FrameTransform,
-    Guides,
-    MechanismWords,
-)
+from hexacell.kinematics.mechanism import Branch, FrameConvention, FrameFreedom, Guides, MechanismWords
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.mechanisms.jointed_legs import JointedLegs
 from hexacell.kinematics.parameters import ParameterKind, ParameterSet, ParameterUnit
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.pose import FrameTransform, PoseBatch
 from hexacell.kinematics.rotations import Array, TurnedAxes, turns_of
 
 _SLIDER_JOINT, _PLATFORM_JOINT, _LENGTH = (
@@ -64,9 +57,6 @@ FIRST_RAIL_FRAME = FrameConvention(
 OWN_RAILS = tuple((leg,) for leg in range(6))
 """Each slider has a rail of its own."""
 
-OPPOSITE_RAD = 3.0
-"""Rails that are farther apart than this count the opposite way."""
-
 
 class SixRails(JointedLegs):
     """6-PUS with any rails."""
@@ -76,7 +66,8 @@ class SixRails(JointedLegs):
     parameters = SIX_RAILS_PARAMETERS
     convention = FIRST_RAIL_FRAME
     frame_freedom = FrameFreedom()
-    base_joint, platform_joint, length = "S", "B", "l"
+    base_joint, platform_joint, length, axis = "S", "B", "l", "rail"
+    opposite = "a slider counts the opposite way of slider 1"
 
     def base_ends(self, geometry: Geometries, joints: Array) -> Array:
         ends: Array = geometry["S"] + joints[..., None] * _directions(geometry)
@@ -110,12 +101,6 @@ class SixRails(JointedLegs):
         x /= across
         base = np.stack([x, np.cross(z, x), z])
         return FrameTransform(base, S[0].copy(), axes_through(B[0], B[2], B[4], "platform"))
-
-    def normalize_frames(self, geometry: Geometry) -> tuple[Geometry, FrameTransform]:
-        normal, change = super().normalize_frames(geometry)
-        if np.linalg.norm(normal["rail"], axis=-1).max() > OPPOSITE_RAD:
-            raise UsageError("a slider counts the opposite way of slider 1")
-        return normal, change
 
     def turned(self, geometry: Geometry, change: FrameTransform) -> dict[str, Array]:
         return {"rail": turns_of(_directions(geometry) @ change.base.T)}

@@ -16,10 +16,9 @@ from hexacell.cell.measuring import NoiseSettings
 from hexacell.cell.model import CellSettings
 from hexacell.cell.passwords import with_passwords
 from hexacell.clock import CellClock
-from hexacell.config.layout import CurrentConfig
+from hexacell.config.layout import ConfigLayout, CurrentConfig
 from hexacell.kinematics.mechanism import joint_zeros
 from hexacell.plugins import Group, load
-from hexacell.robot.model import config_layout
 from procedures.devices.device_set import Devices, MountedGauge, Thermometers
 from procedures.run.cancellation import shielded
 
@@ -45,7 +44,7 @@ def device_addresses(cell: Cell, *, other_processes: bool = False) -> Iterator[C
         settings,
         settings.simulation,
         settings.mechanism,
-        config_layout(settings),
+        ConfigLayout.of(settings),
         cell.config_paths,
         other_processes=other_processes,
     ) as simulated:
@@ -109,7 +108,7 @@ def devices_of(
     if settings.encoders.are_of_controller:
         wiring = {"controller": controller}
         if settings.controller.joints_include_zeros:
-            config = CurrentConfig(config_paths(settings, folder or Path()), config_layout(settings))
+            config = CurrentConfig(config_paths(settings, folder or Path()), ConfigLayout.of(settings))
             # By how much joints that include zeros exceed what the encoders show, by the current config.
             wiring["zeros"] = lambda: joint_zeros(settings.mechanism, config.geometry().geometry).tolist()
     encoders = load(Group.ENCODERS, settings.encoders.protocol)(encoders_with_speed(settings), **wiring)

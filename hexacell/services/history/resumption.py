@@ -13,12 +13,16 @@ import numpy as np
 
 from hexacell.cell.loader import Cell
 from hexacell.config.change import BEFORE, RECEIPT, ConfigChange, Receipt, kept_paths
-from hexacell.config.layout import are_same_files, fingerprint_of, read_contents_if_present
+from hexacell.config.layout import (
+    are_same_files,
+    controller_geometry,
+    fingerprint_of,
+    read_contents_if_present,
+)
 from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import SAME_FRAMES
-from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.robot.model import Robot, controller_geometry
+from hexacell.kinematics.pose import SAME_FRAMES, Pose, PoseBatch
+from hexacell.robot.model import Robot
 from hexacell.robot.stated import stated_limits
 from hexacell.runs.run_folder import RunFolder, find_run, run_folders, runs_folder
 from hexacell.services.history.recorded_cell import started_robot

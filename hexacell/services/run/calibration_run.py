@@ -10,10 +10,10 @@ from drivers.interfaces import DeviceIdentity
 from hexacell import __version__, services
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
-from hexacell.config.layout import CurrentConfig, fingerprint
+from hexacell.config.layout import ConfigLayout, CurrentConfig, controller_geometry, fingerprint
 from hexacell.config.pending_write import held_config
 from hexacell.errors import FileError, HexacellError, UsageError, flatten_errors
-from hexacell.robot.model import config_layout, controller_geometry, robot_of
+from hexacell.robot.model import robot_of
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.design_facts import require_design
 from hexacell.services.devices.device_setup import Connected, device_addresses, open_devices
@@ -155,7 +155,7 @@ async def _checked_devices(
 
 
 async def _position_failures(cell: Cell, connected: Connected) -> list[HexacellError]:
-    config = CurrentConfig(cell.config_paths, config_layout(cell.settings))
+    config = CurrentConfig(cell.config_paths, ConfigLayout.of(cell.settings))
     check = PositionCheck(connected.settings, connected.devices, connected.clock, config)
     return await position_failures(check)
 

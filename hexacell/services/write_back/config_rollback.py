@@ -6,13 +6,12 @@ from pathlib import Path
 
 from hexacell.cell.loader import Cell
 from hexacell.config.change import AFTER, BEFORE, Receipt, diff_of_files
-from hexacell.config.layout import Contents, are_same_files, fingerprint_of, read_contents
+from hexacell.config.layout import ConfigLayout, Contents, are_same_files, fingerprint_of, read_contents
 from hexacell.config.pending_write import held_config
 from hexacell.config.versions import ConfigEditedSince, compare_versions
 from hexacell.config.write_back import restore
 from hexacell.config.write_record import Recording, WriteCause, WriteKind, recorded_write, stated_reason
 from hexacell.errors import FileError, HexacellError, UsageError
-from hexacell.robot.model import config_layout
 from hexacell.runs.run_folder import find_run, run_folders, runs_folder
 from hexacell.services.write_back.proposals import COMMAND
 from procedures.journal.journal import RESTORE
@@ -69,7 +68,9 @@ def roll_back_config(
             if to is not None and undone is not None:
                 why += f", in place of {undone.backup_folder.name}"
             cause = WriteCause(WriteKind.ROLLED_BACK, by, run, why, reason)
-            with recorded_write(runs_folder(cell), paths, config_layout(cell.settings), cause) as recording:
+            with recorded_write(
+                runs_folder(cell), paths, ConfigLayout.of(cell.settings), cause
+            ) as recording:
                 restore(paths, contents, expected=found)
     change = diff_of_files(paths, found, contents)
     folder = None if undone is None else undone.backup_folder
@@ -149,7 +150,7 @@ def _require_known(cell: Cell, receipts: list[Receipt], found: Contents) -> None
 
 
 def _edited_since(cell: Cell, latest: Receipt) -> ConfigEditedSince:
-    layout = config_layout(cell.settings)
+    layout = ConfigLayout.of(cell.settings)
     before, written = (
         (layout.read(*latest.kept(name)), read_contents(latest.kept(name))) for name in (BEFORE, AFTER)
     )

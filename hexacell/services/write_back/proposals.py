@@ -17,7 +17,6 @@ from hexacell.errors import FileError, LimitError, UsageError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import ParameterSet
 from hexacell.results.written_geometry import TaskDisplacement
-from hexacell.robot.model import config_layout
 from hexacell.runs.run_folder import RunFolder
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.journal.journal import RESTORE, now, read_journal
@@ -94,7 +93,7 @@ def read_proposal(folder: RunFolder) -> Proposal:
         state.started.cell,
         change,
         (*state.proposed.gates, _verification_gate(state)),
-        config_layout(settings),
+        ConfigLayout.of(settings),
         settings.mechanism.parameters,
         state,
     )

@@ -11,12 +11,12 @@ from drivers.simulated.imperfections import LoadedMachine
 from hexacell.cell.loader import load_cell
 from hexacell.cell.simulation import SimulatedLegs, SimulatedLoad
 from hexacell.config.interface import ControllerGeometry
+from hexacell.config.layout import controller_geometry
 from hexacell.kinematics.corrections import Corrections
 from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion.trajectory import interpolate_line
-from hexacell.robot.model import controller_geometry
 from tests.cli.cell_folder import CONFIGS
 from tests.native_config import NATIVE
 

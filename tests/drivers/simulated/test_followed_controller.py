@@ -10,11 +10,11 @@ from drivers.simulated.followed_controller import FollowedController, JointSourc
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.cell.simulation import SimulatedFault
+from hexacell.config.layout import ConfigLayout
 from hexacell.errors import UsageError
 from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.robot.model import config_layout
 from tests.small_cell import changed
 from tests.waiting import wait_until
 
@@ -59,7 +59,7 @@ def followed(tmp_path):
     for file in source.parent.glob(f"{source.stem}*.toml"):
         shutil.copy(file, tmp_path)
     cell = load_cell(tmp_path / source.name)
-    form = config_layout(cell.settings)
+    form = ConfigLayout.of(cell.settings)
     opened: list[FollowedController] = []
 
     def follow(poses: list[Pose], **changes) -> tuple[FollowedController, np.ndarray]:

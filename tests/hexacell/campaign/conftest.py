@@ -12,10 +12,11 @@ from hexacell.campaign.planner import Plan
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.checks.check import Check, identified_before
+from hexacell.config.layout import ConfigLayout
 from hexacell.design.candidate_refinement import QUICK, SearchEffort
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
-from hexacell.robot.model import Robot, config_layout, make_robot
+from hexacell.robot.model import Robot, make_robot
 from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.verdict.decision import ErrorLimits
 
@@ -39,7 +40,7 @@ def make(**changes: Any) -> Plan:
         section, _, key = name.partition("__")
         inner = getattr(settings, section).model_copy(update={key: value})
         settings = settings.model_copy(update={section: inner})
-    controller = config_layout(settings).read(cell.config_path)
+    controller = ConfigLayout.of(settings).read(cell.config_path)
     return Plan(settings, make_robot(settings, controller), listed, FEW)
 
 

@@ -17,9 +17,8 @@ from hexacell.cell.measuring import AcceptanceSettings
 from hexacell.config.interface import ControllerGeometry
 from hexacell.identification.diagnostics.frame_alignment import PoseErrors
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
-from hexacell.kinematics.pose import Pose
+from hexacell.kinematics.pose import FrameTransform, Pose
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.results.written_geometry import TaskDisplacement, as_written
 from hexacell.robot.model import Robot, make_robot

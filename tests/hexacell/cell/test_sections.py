@@ -11,7 +11,8 @@ from hexacell.cell.recovery import Action, AttendedRecovery, FailureKind, Unatte
 from hexacell.cell.uncertainty import SIZES_OF_GRADES, Grade, RotaryUncertaintySettings, UncertaintySettings
 from hexacell.errors import FileError
 from hexacell.identification.identified_zeros import ParameterChoice
-from hexacell.robot.model import noise_of, robot_of
+from hexacell.robot.model import robot_of
+from hexacell.robot.stated import noise_of
 
 
 @pytest.fixture

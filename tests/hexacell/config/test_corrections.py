@@ -22,7 +22,6 @@ from hexacell.kinematics.corrections import NO_CORRECTIONS, CorrectionKind, Corr
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.gough_stewart import GOUGH_STEWART_PARAMETERS
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
-from hexacell.robot.model import config_layout
 from hexacell.storage.toml_document import TomlDocument
 from hexacell.text.config_changes import correction_lines
 from tests.cli.cell_folder import CONFIGS
@@ -191,7 +190,7 @@ def test_a_change_names_what_it_adds_and_is_undone_bit_for_bit(config: Path, geo
 
 def linuxcnc(name: str) -> tuple[ConfigLayout, tuple[Path, ...]]:
     cell = load_cell(CONFIGS / name / "cell.toml")
-    return config_layout(cell.settings), cell.config_paths
+    return ConfigLayout.of(cell.settings), cell.config_paths
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n"])

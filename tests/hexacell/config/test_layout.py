@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hexacell.config.layout import ConfigLayout, FormatOfFile
+from hexacell.config.layout import ConfigLayout, FormatOfFile, controller_geometry
 from hexacell.config.line_templates import LineTemplates
 from hexacell.config.linuxcnc_hal import HalPins
 from hexacell.config.linuxcnc_ini import LinuxcncIni
@@ -13,7 +13,6 @@ from hexacell.config.toml_format import NativeToml
 from hexacell.errors import FileError, HexacellError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
-from hexacell.robot.model import controller_geometry
 from tests.several_config_files import LAYOUT, drawn_geometry, hexapod_cell, write_config
 
 SIGNS = [1, 1, 1, -1, -1, -1]

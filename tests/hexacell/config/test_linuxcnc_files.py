@@ -17,7 +17,6 @@ from hexacell.config.linuxcnc_ini import limits_of_ini
 from hexacell.config.write_back import commit, rollback
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
-from hexacell.robot.model import config_layout
 from tests.several_config_files import LAYOUT, write_config
 
 CONFIGS = Path(__file__).parents[3] / "configs"
@@ -50,7 +49,7 @@ def real(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
         layout, paths = LAYOUT, write_config(tmp_path_factory.mktemp("drawn"))
     else:
         cell = load_cell(CELLS[request.param])
-        layout, paths = config_layout(cell.settings), cell.config_paths
+        layout, paths = ConfigLayout.of(cell.settings), cell.config_paths
     return Real(layout, tuple(path.read_bytes().decode().replace("\r\n", "\n") for path in paths))
 
 

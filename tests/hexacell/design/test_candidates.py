@@ -21,8 +21,7 @@ from hexacell.design.candidates import (
 from hexacell.design.criteria import D_OPTIMAL, Criterion, covariance_update
 from hexacell.design.predicted_records import SAFETY_SIGMAS, TRAVEL_SHARE, gauge_zero_at, predict_records
 from hexacell.design.travel_monte_carlo import TravelConstraint
-from hexacell.kinematics.mechanism import FrameTransform
-from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.pose import FrameTransform, Pose, PoseBatch
 
 TILT = float(np.radians(45.0))
 

@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 from hexacell.design.candidates import orientations
 from hexacell.design.validation_poses import select_validation_poses
 from hexacell.errors import LimitError
-from hexacell.kinematics.mechanism import FrameTransform
-from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.pose import FrameTransform, Pose, PoseBatch
 from hexacell.motion.path_check import is_clear
 from tests.geometries import hexaglide_geometry
 

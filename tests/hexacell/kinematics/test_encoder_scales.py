@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hexacell.cell.loader import load_cell
+from hexacell.config.layout import ConfigLayout
 from hexacell.conformance import MechanismConformance, MechanismExample
 from hexacell.conformance.frame_checks import records_without_noise
 from hexacell.errors import FileError
@@ -15,7 +16,7 @@ from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.encoder_scales import WithEncoderScales
-from hexacell.robot.model import Robot, config_layout, robot_of
+from hexacell.robot.model import Robot, robot_of
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 SCALES = 1e-6 * np.array([300.0, -200.0, 100.0, -300.0, 200.0, -100.0])
@@ -85,7 +86,7 @@ def test_they_are_written_beside_the_other_numbers(cell_with: CellWith) -> None:
     robot, text = robot_of(cell), cell.config_path.read_text()
     assert isinstance(robot.mechanism, WithEncoderScales)
     changed = robot.mechanism.with_scales(robot.mechanism.without_scales(robot.controller), SCALES)
-    [written] = config_layout(cell.settings).rewrite([text], changed)
+    [written] = ConfigLayout.of(cell.settings).rewrite([text], changed)
     assert "encoder_scale = [0.0003, -0.0002, 0.0001, -0.0003, 0.0002, -0.0001]" in written
     assert len(written.splitlines()) == len(text.splitlines())
 

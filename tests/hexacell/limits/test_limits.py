@@ -7,9 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hexacell.kinematics.legs import Legs
-from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
-from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.pose import FrameTransform, Pose, PoseBatch
 from hexacell.limits.gauge_travel import GaugeRoom, GaugeTravel
 from hexacell.limits.leg_limits import LegLimits
 from hexacell.limits.limits import AxisLimits, Limits

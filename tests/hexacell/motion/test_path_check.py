@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
-from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.pose import FrameTransform, Pose, PoseBatch
 from hexacell.limits.leg_limits import LegLimits
 from hexacell.limits.limits import AxisLimits
 from hexacell.motion.path_check import LinesFrom, is_clear

@@ -20,8 +20,8 @@ from hexacell.noise.noise_assessment import (
     assess_noise,
     worthwhile_windows,
 )
-from hexacell.robot.model import noise_of, robot_of
-from hexacell.robot.stated import stated_effects
+from hexacell.robot.model import robot_of
+from hexacell.robot.stated import noise_of, stated_effects
 from hexacell.uncertainty.effects import Occurrence
 from tests.small_cell import changed
 

@@ -8,10 +8,10 @@ from typing import Any
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.config.change import ConfigChange, propose
-from hexacell.config.layout import fingerprint
+from hexacell.config.layout import ConfigLayout, fingerprint
 from hexacell.kinematics.corrections import Corrections
 from hexacell.kinematics.geometry import Geometry
-from hexacell.robot.model import config_layout, robot_of
+from hexacell.robot.model import robot_of
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.run.calibration_run import run_started
 from hexacell.verdict.acceptance_gates import AcceptanceGate
@@ -62,7 +62,7 @@ def propose_run(
     """A run that proposes every number of the config of now, shifted, and corrections."""
     folder = RunFolder(runs_folder(cell) / name)
     folder.create(cell)
-    layout = config_layout(cell.settings)
+    layout = ConfigLayout.of(cell.settings)
     found = layout.read(*cell.config_paths).geometry
     after = Geometry(found.parameters, found.vector + shift_mm)
     start = fingerprint(*cell.config_paths)

@@ -10,10 +10,10 @@ import pytest
 
 from hexacell.cell.loader import Cell
 from hexacell.config import write_record
+from hexacell.config.layout import ConfigLayout
 from hexacell.config.write_back import commit
 from hexacell.config.write_record import RECORDS, THE_RUN, WriteCause, WriteKind, recorded_write
 from hexacell.errors import UsageError
-from hexacell.robot.model import config_layout
 from hexacell.runs.cell_lock import user_name
 from hexacell.runs.run_folder import runs_folder
 from hexacell.services.write_back.config_history import config_history
@@ -139,7 +139,7 @@ def journalled(run: ProposedRun, *more: events.Event) -> None:
 def test_a_provisional_geometry_has_no_verdict(cell) -> None:
     run = propose_run(cell)
     cause = WriteCause(WriteKind.PROVISIONAL, THE_RUN, run.folder.name, "to measure on")
-    with recorded_write(run.folder.siblings, cell.config_paths, config_layout(cell.settings), cause):
+    with recorded_write(run.folder.siblings, cell.config_paths, ConfigLayout.of(cell.settings), cause):
         commit(run.change, run.folder.path)
     (written,) = config_history(cell).writes
     assert (written.record.kind, written.verdict, written.why) == (
@@ -171,7 +171,7 @@ def test_writes_within_a_millisecond_stay_in_their_order_and_are_told_once(cell,
     monkeypatch.setattr(write_record, "datetime", record_time)
     monkeypatch.setattr(journals, "now", lambda: (at.replace(microsecond=999), 1.0))
     cause = WriteCause(WriteKind.RESULT, "a tester", run.folder.name, "")
-    with recorded_write(run.folder.siblings, cell.config_paths, config_layout(cell.settings), cause):
+    with recorded_write(run.folder.siblings, cell.config_paths, ConfigLayout.of(cell.settings), cause):
         commit(run.change, run.folder.path)
     judged = events.ResultValidated(verdict=Verdict.FAIL, line="0.3 mm: fail (worse than before)")
     journalled(run, events.Committed(approved_by="a tester"), judged, events.RolledBack())

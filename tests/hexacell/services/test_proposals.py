@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from hexacell.config.change import Receipt
+from hexacell.config.layout import ConfigLayout
 from hexacell.config.versions import ConfigEditedSince
 from hexacell.config.write_record import NumberChange
 from hexacell.errors import (
@@ -19,7 +20,6 @@ from hexacell.errors import (
     WriteBackUndone,
 )
 from hexacell.kinematics.corrections import Corrections
-from hexacell.robot.model import config_layout
 from hexacell.runs.cell_lock import cell_lock
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services.write_back.config_history import config_history
@@ -149,7 +149,7 @@ CORRECTED = Corrections(
 
 async def test_corrections_are_shown_written_recorded_and_undone_with_the_geometry(cell) -> None:
     run = propose_run(cell, gates=(DOUBTFUL,), shift_mm=0.01, corrections=CORRECTED)
-    person, layout = Person(), config_layout(cell.settings)
+    person, layout = Person(), ConfigLayout.of(cell.settings)
     applied = await apply_proposal(read_proposal(run.folder), person)
     (question,) = person.asked
     view = question_view(question, None)

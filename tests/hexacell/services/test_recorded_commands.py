@@ -14,8 +14,8 @@ from hexacell.config.interface import ControllerLimits
 from hexacell.config.toml_format import native_layout
 from hexacell.errors import IdentifiabilityError
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
+from hexacell.kinematics.pose import FrameTransform
 from hexacell.measurements.records import MeasurementSet
 from hexacell.noise.measured_noise import InstrumentNoise, MeasuredNoise
 from hexacell.runs.run_folder import RunFolder

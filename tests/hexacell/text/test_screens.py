@@ -28,7 +28,7 @@ from hexacell.text.screens.views import Urgency
 from hexacell.verdict.decision import Verdict
 from procedures.engine.command_loop import Status
 from procedures.run.keys import Phase, SetKey
-from procedures.run.questions import ask_mounting
+from procedures.run.questions import ask_placement
 from procedures.run.state import fold
 from procedures.run.trips import Guard
 from procedures.steps import events
@@ -123,7 +123,11 @@ def test_the_time_that_is_left_follows_from_the_pace() -> None:
 def test_who_watches_is_told_who_is_in_control() -> None:
     picture = pictured(described(), ControlChanged(is_in_control=False, who="grace"))
     assert guidance(picture, None)["Stop"] == "you only watch: grace is in control; c takes over"
-    asked = picture_after(picture, QuestionOpened(question=ask_mounting(1, 1, Pose(0.0, 0.0, 0.0))), 0.0)
+    asked = picture_after(
+        picture,
+        QuestionOpened(question=ask_placement(SetKey(phase=Phase.LENGTH, point=1), Pose(0.0, 0.0, 0.0))),
+        0.0,
+    )
     assert guidance(asked, None)["Now"] == "a question waits for who is in control"
 
 

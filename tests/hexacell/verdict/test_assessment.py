@@ -14,9 +14,8 @@ from hexacell.config.interface import ControllerGeometry
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import DataFault, DataFaultKind, Termination
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
-from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.pose import FrameTransform, Pose, PoseBatch
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import make_robot
 from hexacell.verdict.assessment import assess

@@ -27,12 +27,11 @@ from hexacell.kinematics.mechanism import (
     ConstraintDerivatives,
     FrameConvention,
     FrameFreedom,
-    FrameTransform,
     Guides,
     MechanismWords,
 )
 from hexacell.kinematics.parameters import MachinePart, ParameterKind, ParameterSet
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.pose import FrameTransform, PoseBatch
 from hexacell.kinematics.rotations import Array
 
 PARAMETERS = ParameterSet(

@@ -17,9 +17,9 @@ from hexacell.identification.diagnostics.frame_alignment import (
     pose_errors,
 )
 from hexacell.kinematics.forward import forward_kinematics
-from hexacell.kinematics.mechanism import FrameFreedom, FrameTransform
+from hexacell.kinematics.mechanism import FrameFreedom
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
-from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.pose import FrameTransform, Pose, PoseBatch
 
 LENGTH = 180.0
 

@@ -8,7 +8,7 @@ import pytest
 from hexacell.identification.diagnostics.geometry_change import largest_change
 from hexacell.kinematics import rotations
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import FrameTransform
+from hexacell.kinematics.pose import FrameTransform
 from hexacell.robot.model import robot_of
 from hexacell.robot.virtual_robot import robots_within_tolerances
 

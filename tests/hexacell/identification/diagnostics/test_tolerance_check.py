@@ -12,8 +12,8 @@ from hexacell.identification.problem.prior import Tolerances
 from hexacell.identification.solver.result import GeometryEstimate, Termination
 from hexacell.kinematics import rotations
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
+from hexacell.kinematics.pose import FrameTransform
 from hexacell.robot.virtual_robot import random_robot
 
 MECHANISM = Hexaglide()

@@ -6,8 +6,8 @@ from scipy.spatial.transform import Rotation
 
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import Noise
-from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.kinematics.pose import FrameTransform
 from hexacell.measurements.records import MeasurementSet, Record
 
 EXACT_MM = 1e-6

@@ -6,8 +6,8 @@ import pytest
 from hexacell.identification.estimator import estimate_online, identify
 from hexacell.identification.problem.prior import Prior, Tolerances
 from hexacell.kinematics import rotations
-from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
+from hexacell.kinematics.pose import FrameTransform
 from hexacell.robot.virtual_robot import random_robot
 
 

@@ -15,7 +15,7 @@ from hexacell.measurements.records import MeasurementSet, RecordId
 from hexacell.results.result import AcceptedResult
 from hexacell.uncertainty.effects import Effect
 from hexacell.verdict.decision import Verdict, VerifiedAccuracy
-from hexacell.verdict.outcome import outcome_of
+from hexacell.verdict.verification import outcome_of
 
 
 class ParameterChange(Frozen):

@@ -10,8 +10,7 @@ from functools import cached_property
 
 from hexacell.campaign.planner import Plan
 from hexacell.cell.fields import Frozen
-from hexacell.checks.check import Check, check_settings
-from hexacell.checks.drift_estimator import DriftEstimator, ScaledEstimate
+from hexacell.checks.check import Check, DriftEstimator, ScaledEstimate, check_settings
 from hexacell.design.criteria import add_information
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.problem.prior import IdentifiedBefore, Prior

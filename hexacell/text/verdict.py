@@ -12,8 +12,7 @@ from hexacell.text.layout import change_with_sigma
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy
 from hexacell.verdict.length_check import LengthStatement
-from hexacell.verdict.outcome import scale_words
-from hexacell.verdict.verification import Verification
+from hexacell.verdict.verification import Verification, scale_words
 
 VERDICT_MEANINGS = {
     Verdict.PASS: "The error and the guard band together are within the limit.",

@@ -23,7 +23,7 @@ from procedures.run.questions import Question
 from procedures.run.state import RunState, apply, fold
 from procedures.run.trips import GuardTripped, RobotNotStopped, may_still_move
 from procedures.steps import events
-from procedures.steps.registry import Step
+from procedures.steps.events import Step
 from procedures.workflow.next_step import StepExecutor
 
 Listener = Callable[[events.Event, RunState], None]

@@ -31,9 +31,9 @@ from procedures.run.trips import Guard, GuardTripped, RobotNotStopped, causes_of
 from procedures.steps import events
 from procedures.steps.base import BaseEvent, BaseStep, StepOfSet
 from procedures.steps.commit import Committed
+from procedures.steps.events import Step
 from procedures.steps.lend import ProvisionalApplied
 from procedures.steps.place import MountingError
-from procedures.steps.registry import Step
 from procedures.steps.roll_back import RollBack
 from procedures.steps.take_back import TakeBack
 from procedures.workflow.next_step import StepExecutor

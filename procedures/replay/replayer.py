@@ -27,8 +27,7 @@ from procedures.replay.recorded_executor import TOLERANCE, RecordedStepExecutor
 from procedures.run.readings import Reading
 from procedures.run.state import RunState, apply
 from procedures.steps import events
-from procedures.steps.events import Event
-from procedures.steps.registry import Step
+from procedures.steps.events import Event, Step
 
 WORDING_FIELDS = frozenset({"sentence", "line", "reason"})
 """Text fields; a later version may word them differently."""

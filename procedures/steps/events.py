@@ -1,6 +1,7 @@
-"""The events of a run, as the journal keeps them; everything else is derived from them.
+"""All steps, and the events of a run, as the journal keeps them; everything else is derived from these.
 
-Here are those that are no outcome of a step: how a run begins, is interrupted, and ends. The others are
+A line in ``STEPS`` is all that makes a class a step of the journal, of the engine and of a replay. Here
+are the events that are no outcome of a step: how a run begins, is interrupted, and ends. The others are
 imported, so that this is the namespace in which other packages name all of them.
 """
 
@@ -21,28 +22,55 @@ from hexacell.results.written_geometry import TaskDisplacement
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, place_of
 from procedures.run.trips import Guard, Trip
-from procedures.steps.accept import ResultAccepted
-from procedures.steps.assess_noise import NoiseMeasured
-from procedures.steps.base import BaseEvent, EventOfSet
-from procedures.steps.close import SetClosed
-from procedures.steps.commit import Committed
-from procedures.steps.identify import Identified
-from procedures.steps.judge import ConfirmationPlanned, ResultValidated
-from procedures.steps.lend import ProvisionalApplied
-from procedures.steps.locate import Located
+from procedures.steps.accept import Accept, ResultAccepted
+from procedures.steps.assess_noise import AssessNoise, NoiseMeasured
+from procedures.steps.base import BaseEvent, BaseStep, EventOfSet
+from procedures.steps.close import CloseSet, SetClosed
+from procedures.steps.commit import Commit, Committed
+from procedures.steps.identify import Identified, Identify
+from procedures.steps.judge import ConfirmationPlanned, Judge, ResultValidated
+from procedures.steps.lend import Lend, ProvisionalApplied
+from procedures.steps.locate import Locate, Located
 from procedures.steps.move import Arrived, Move, PoseExcluded
-from procedures.steps.pilot import PilotTaken
-from procedures.steps.place import GaugesPlaced
-from procedures.steps.probe import GaugesProbed
-from procedures.steps.propose import Proposed
-from procedures.steps.registry import STEPS, Step
-from procedures.steps.repeat import ReferenceRepeated
-from procedures.steps.revisit import ReferenceConfirmed, SetInvalidated
-from procedures.steps.roll_back import RolledBack
-from procedures.steps.sample import RecordRejected, RecordTaken
-from procedures.steps.standstill import StandstillRead
-from procedures.steps.take_back import ProvisionalReverted
-from procedures.steps.try_gauges import GaugesTried
+from procedures.steps.pilot import Pilot, PilotTaken
+from procedures.steps.place import GaugesPlaced, Place
+from procedures.steps.probe import GaugesProbed, Probe
+from procedures.steps.propose import Propose, Proposed
+from procedures.steps.repeat import ReferenceRepeated, Repeat
+from procedures.steps.revisit import ReferenceConfirmed, Revisit, SetInvalidated
+from procedures.steps.roll_back import RollBack, RolledBack
+from procedures.steps.sample import RecordRejected, RecordTaken, Sample
+from procedures.steps.standstill import Standstill, StandstillRead
+from procedures.steps.take_back import ProvisionalReverted, TakeBack
+from procedures.steps.try_gauges import GaugesTried, Try
+
+STEPS: tuple[type[BaseStep], ...] = (
+    Locate,
+    Move,
+    Place,
+    Sample,
+    Revisit,
+    CloseSet,
+    Standstill,
+    Pilot,
+    Repeat,
+    Probe,
+    Try,
+    AssessNoise,
+    Lend,
+    TakeBack,
+    Identify,
+    Propose,
+    Commit,
+    Judge,
+    Accept,
+    RollBack,
+)
+
+if TYPE_CHECKING:
+    Step = BaseStep
+else:  # what a file may have: exactly one of these, distinguished by its kind
+    Step = Annotated[Union[STEPS], Field(discriminator="kind")]  # noqa: UP007
 
 
 class RunStarted(BaseEvent):

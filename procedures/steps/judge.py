@@ -12,8 +12,14 @@ from hexacell.measurements.csv_file import write_measurements
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.length_check import LengthMeasurements, LengthStatement, length_statement
-from hexacell.verdict.outcome import length_line, outcome_line, reason_of
-from hexacell.verdict.verification import HeldOut, Verification, verify
+from hexacell.verdict.verification import (
+    HeldOut,
+    Verification,
+    length_line,
+    outcome_line,
+    reason_of,
+    verify,
+)
 from procedures.resources.run_resources import RunResources
 from procedures.run.keys import Phase, SixNumbers
 from procedures.run.readings import legs_warmer

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from hexacell.errors import LimitError
 from procedures.run.keys import Phase, SetKey, SixNumbers
 from procedures.run.state import RunState
+from procedures.steps.events import Step
 from procedures.steps.judge import Judge
 from procedures.steps.locate import Locate
 from procedures.steps.move import Move
-from procedures.steps.registry import Step
 from procedures.workflow.sets import SetSteps, TravelError, reference_move, require_zero
 
 BY_CHANCE = 3

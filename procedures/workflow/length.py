@@ -15,9 +15,9 @@ from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState
+from procedures.steps.events import Step
 from procedures.steps.locate import Locate
 from procedures.steps.move import Move
-from procedures.steps.registry import Step
 from procedures.workflow.sets import NoSafePath, SetSteps, TravelError
 
 BESIDE_MM = np.array([1.0, -0.8, 0.6])

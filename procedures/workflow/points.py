@@ -21,11 +21,11 @@ from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState
 from procedures.steps.assess_noise import AssessNoise
 from procedures.steps.close import CloseSet
+from procedures.steps.events import Step
 from procedures.steps.lend import Lend
 from procedures.steps.locate import Locate
 from procedures.steps.move import Move
 from procedures.steps.pilot import Pilot
-from procedures.steps.registry import Step
 from procedures.steps.repeat import Repeat
 from procedures.steps.standstill import Standstill
 from procedures.workflow.sets import Known, SetSteps, beside, move_to_chosen, reference_pose, require_zero

@@ -29,10 +29,10 @@ from hexacell.robot.model import Robot
 from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
 from procedures.run.state import RunState, SetState
 from procedures.steps.close import CloseSet
+from procedures.steps.events import Step
 from procedures.steps.move import Expectation, Move
 from procedures.steps.place import Place
 from procedures.steps.probe import Probe
-from procedures.steps.registry import Step
 from procedures.steps.revisit import Revisit
 from procedures.steps.sample import Sample
 from procedures.steps.try_gauges import Try, trial_of

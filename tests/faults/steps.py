@@ -8,12 +8,12 @@ from procedures.journal import journal
 from procedures.run.keys import Phase
 from procedures.steps import events
 from procedures.steps.base import StepOfSet, StepWithoutMotion
+from procedures.steps.events import Step
 from procedures.steps.locate import Locate
 from procedures.steps.move import Move
 from procedures.steps.pilot import Pilot
 from procedures.steps.place import Place
 from procedures.steps.probe import Probe
-from procedures.steps.registry import Step
 from procedures.steps.repeat import Repeat
 from procedures.steps.revisit import Revisit
 from procedures.steps.sample import Sample

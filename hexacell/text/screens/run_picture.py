@@ -12,8 +12,8 @@ from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import Question
 from procedures.run.state import RunState, apply
 from procedures.steps import events
+from procedures.steps.events import Step
 from procedures.steps.move import Expectation, Move
-from procedures.steps.registry import Step
 
 Setback = events.Tripped | events.Failed | events.Interrupted | messages.HostFailed
 """What a fault is shown from."""

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.simulated.corrected_joints import directions_on, with_longer_legs
 from drivers.simulated.imperfections import LoadedMachine
+from drivers.simulated.robot import directions_on, with_longer_legs
 from hexacell.cell.loader import load_cell
 from hexacell.cell.simulation import SimulatedLegs, SimulatedLoad
 from hexacell.config.interface import ControllerGeometry

@@ -11,7 +11,7 @@ from hexacell.text.measured_noise import measured_noise_text
 from hexacell.text.verdict import earlier_scale_line, length_text, not_checked, scale_lines
 from hexacell.verdict.decision import JudgedError, Verdict
 from hexacell.verdict.length_check import LengthStatement
-from hexacell.verdict.outcome import length_line
+from hexacell.verdict.verification import length_line
 
 SIZES = {
     "noise of the readings": 8.0,

@@ -16,8 +16,7 @@ from hexacell.robot.model import robot_of
 from hexacell.text.verdict import not_checked, verification_text
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.length_check import LengthMeasurements, length_standard
-from hexacell.verdict.outcome import outcome_line
-from hexacell.verdict.verification import HeldOut, Verification, verify
+from hexacell.verdict.verification import HeldOut, Verification, outcome_line, verify
 from tests.hexacell.altered_records import altered, later
 from tests.hexacell.verdict.two_seat_records import two_seat_records
 

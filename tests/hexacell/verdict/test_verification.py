@@ -19,8 +19,7 @@ from hexacell.results.written_geometry import as_written
 from hexacell.robot.model import Robot, robot_of
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.model_evidence import ZEROS_DOUBTED
-from hexacell.verdict.outcome import outcome_line, reason_of
-from hexacell.verdict.verification import HeldOut, Verification, verify
+from hexacell.verdict.verification import HeldOut, Verification, outcome_line, reason_of, verify
 from tests.hexacell.altered_records import later
 from tests.small_cell import changed
 

@@ -15,8 +15,8 @@ from procedures.journal.journal import Journal, read_journal
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
 from procedures.steps import events
+from procedures.steps.events import Step
 from procedures.steps.move import Move
-from procedures.steps.registry import Step
 from procedures.steps.sample import Sample
 from tests.procedures.fakes import SilentOperator
 from tests.procedures.story import READING

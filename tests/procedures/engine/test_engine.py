@@ -23,8 +23,8 @@ from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
 from procedures.run.trips import RobotNotStopped
 from procedures.steps import events
+from procedures.steps.events import Step
 from procedures.steps.move import Move
-from procedures.steps.registry import Step
 from tests.procedures.rig import failure_without_record
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)

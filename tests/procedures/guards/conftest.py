@@ -20,7 +20,7 @@ from hexacell.errors import DeviceError
 from procedures.run.questions import Question
 from procedures.run.state import RunState, apply
 from procedures.steps import events
-from procedures.steps.registry import Step
+from procedures.steps.events import Step
 
 QUIET = 12
 """So many turns of the event loop without a new sleeper: everybody waits for time to pass."""

@@ -22,10 +22,9 @@ from procedures.run.readings import (
 from procedures.run.state import RunState, apply, fold
 from procedures.steps import events
 from procedures.steps.close import CloseSet
-from procedures.steps.events import EVENTS
+from procedures.steps.events import EVENTS, STEPS, Step
 from procedures.steps.move import Move
 from procedures.steps.pilot import Pilot
-from procedures.steps.registry import STEPS, Step
 from procedures.steps.roll_back import RollBack
 from procedures.steps.sample import Sample
 from tests.procedures.story import READING, an_identification, located

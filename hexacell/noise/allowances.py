@@ -98,17 +98,25 @@ class Allowances:
         room = gauge_travel_of(self.settings).sure_room.smallest_mm
         return max(stated, room / float(np.linalg.norm(ball.by_joints, axis=0).max()))
 
-    def since(self, reference: Pose, before: Array, now: Array) -> ReferenceChange:
-        """The change of two readings (9,) at one reference: gauges x, y, z, mm, then the encoders."""
+    def since(
+        self, reference: Pose, before: Array, now: Array, unknown: Array | None = None
+    ) -> ReferenceChange:
+        """The change of two readings (9,) at one reference: gauges x, y, z, mm, then the encoders.
+
+        ``unknown`` is how far each joint (6,) may be from where it was taken to be in both together.
+        """
         ball, change = self.ball_at(reference), now - before
         joints = change[3:]
         covariance = 2.0 * self._record_covariance(ball) + ball.covariance(joints)
         is_fixed = self.settings.guards.limits == "fixed"
+        explicable = SIGMAS * np.sqrt(np.diag(covariance))
+        if unknown is not None:
+            explicable = explicable + np.abs(ball.by_joints) @ unknown
         return ReferenceChange(
             unexplained_mm=change[:3] - ball.motion(joints),
             covariance=covariance,
             by_stops=2.0 * ball.by_joints @ ball.by_joints.T,
-            explicable_mm=np.zeros(3) if is_fixed else SIGMAS * np.sqrt(np.diag(covariance)),
+            explicable_mm=np.zeros(3) if is_fixed else explicable,
             joints=joints,
             explicable_joints=0.0 if is_fixed else float(np.sqrt(2.0)) * self.stop_sigmas * self.stops,
         )

@@ -81,7 +81,16 @@ def since_zero(allowances: Allowances, measured: SetState, now: Reading) -> Refe
     zero = measured.samples[0]
     reference = Pose(*zero.pose)
     before, after = (_gauges_and_joints(one, reference, allowances) for one in (zero.reading, now))
-    return allowances.since(reference, before, after)
+    unknown = _on_unknown_sides(zero.reading, allowances) + _on_unknown_sides(now, allowances)
+    return allowances.since(reference, before, after, unknown)
+
+
+def _on_unknown_sides(reading: Reading, allowances: Allowances) -> Array:
+    """How far joints (6,) may be beside their encoders by backlash that was found, on an unknown side."""
+    if allowances.found is None or allowances.found.terms is None:
+        return np.zeros(LEGS)
+    is_unknown = np.array(reading.directions or (0,) * LEGS) == 0
+    return np.abs(allowances.found.terms.beside_encoders(is_unknown))
 
 
 def repeated_readings(state: RunState, plan: Plan, allowances: Allowances) -> Iterator[ReferenceChange]:

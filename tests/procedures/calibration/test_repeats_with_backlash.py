@@ -54,6 +54,11 @@ def test_a_reference_reached_from_another_side_is_no_slipped_gauge(allowances: A
     )
     assert without > 0.2
     assert with_it < 0.3 * without
+    unknown = since_zero(allowances, at_zero, reading(moved, encoders, (0,) * 6))  # type: ignore[arg-type]
+    assert np.abs(unknown.unexplained_mm).max() > 0.2
+    assert not unknown.exceeds(0.1), "joints of which nobody knows from which side they came"
+    slipped = reading(moved + 1.0, encoders, FROM_BOTH_SIDES)
+    assert since_zero(allowances, at_zero, slipped).exceeds(0.1)  # type: ignore[arg-type]
 
 
 def test_few_visits_leave_room_for_a_larger_scatter(allowances: Allowances) -> None:

@@ -86,11 +86,11 @@ def since_zero(allowances: Allowances, measured: SetState, now: Reading) -> Refe
 
 
 def _on_unknown_sides(reading: Reading, allowances: Allowances) -> Array:
-    """How far joints (6,) may be beside their encoders by backlash that was found, on an unknown side."""
-    if allowances.found is None or allowances.found.terms is None:
+    """How far joints (6,) may be beside their encoders by backlash that is known, on an unknown side."""
+    if allowances.terms is None:
         return np.zeros(LEGS)
     is_unknown = np.array(reading.directions or (0,) * LEGS) == 0
-    return np.abs(allowances.found.terms.beside_encoders(is_unknown))
+    return np.abs(allowances.terms.beside_encoders(is_unknown))
 
 
 def repeated_readings(state: RunState, plan: Plan, allowances: Allowances) -> Iterator[ReferenceChange]:

@@ -290,17 +290,6 @@ def test_backlash_as_linuxcnc_takes_it(joint: str, added: str, problem: str, bac
         assert INI.read(new, None).corrections.backlash == pytest.approx(LAGGING.backlash, abs=1e-6)
 
 
-def test_of_two_files_the_one_with_joints_gets_the_backlash(tmp_path: Path) -> None:
-    paths = write_config(tmp_path)
-    texts = [path.read_bytes().decode() for path in paths]
-    found = LAYOUT.read(*paths)
-    assert found.holds == {CorrectionKind.BACKLASH}
-    hal, ini = LAYOUT.rewrite(texts, found.geometry, LAGGING)
-    assert hal == texts[0]
-    assert ini.count("BACKLASH") == 2
-    assert read(LAYOUT, hal, ini) == LAGGING
-
-
 def test_backlash_in_two_files_is_refused(tmp_path: Path) -> None:
     ini = FormatOfFile("linuxcnc-ini", LinuxcncIni(GOUGH_STEWART_PARAMETERS, ZEROS, is_part=True))
     hal, _ = LAYOUT.formats

@@ -4,7 +4,10 @@ from typing import Any
 
 import pytest
 
+from hexacell.text.terms import run_terms_text
 from hexacell.verdict.decision import Verdict
+from procedures.journal.journal import read_journal
+from procedures.run.state import fold
 from procedures.steps import events
 from tests.native_config import NATIVE
 
@@ -36,4 +39,7 @@ async def test_the_controller_corrects_what_was_found_and_the_machine_passes(mak
     assert written.play_mm == pytest.approx(PLAY_MM, abs=0.06)
     assert written.compliance_um_n == pytest.approx((0.3,) * 6, abs=0.3)
     assert written.backlash == pytest.approx((0.08,) * 6, abs=0.05)
+    said = run_terms_text(fold(read_journal(site.folder.journal)))
+    assert said.count("corrected by the controller") == 3
+    assert " mm with the best geometry alone, " in said
     assert judged.verification.after_mm < 0.15 < judged.verification.before_mm

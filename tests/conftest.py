@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-GRACE_S = 20.0  # for what is on its way out when a test returns; only a test that fails waits so long
+GRACE_S = 90.0  # for what is on its way out when a test returns; only a test that fails waits so long
 TESTS = Path(__file__).parent
 BENCHMARKS = TESTS / "benchmarks"
 _KEPT_OPEN = re.compile(r"/mpl-data/|\.so(\.[0-9.]+)?$")

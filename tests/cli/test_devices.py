@@ -1,5 +1,6 @@
 """``hexacell devices``: on an empty machine, with every protocol on pseudo-terminals, watching one."""
 
+import io
 import os
 import re
 import tomllib
@@ -261,25 +262,20 @@ def test_what_comes_instead_of_readings_is_counted_by_kind(
     assert meaning in said
 
 
+@pytest.mark.usefixtures("patient")
 def test_a_cell_file_is_written_from_what_was_found_and_answers(
-    start, cell_folder, terminal, addresses
+    typed_here, cell_folder, monkeypatch, addresses
 ) -> None:
+    """Only its name is typed: all else is suggested. That every protocol is tried is tested above."""
+    tried = ["cdi", "mux10", "sylvac"]
+    monkeypatch.setattr("hexacell.services.devices.device_search.names", lambda _group: tried)
     gauges, adapter, controller = addresses
-    process = start_at(
-        terminal, start, "devices", *gauges, adapter, "--controller", controller, "--write", "cell/new.toml"
+    monkeypatch.setattr("hexacell.cli.commands.devices.is_interactive", lambda: True)
+    monkeypatch.setattr("sys.stdin", io.StringIO("press 3\n" + 30 * "\n"))
+    outcome = typed_here(
+        "devices", *gauges, adapter, "--controller", controller, "--write", "cell/new.toml"
     )
-    answers = {
-        "What is this cell called?": "press 3",
-        "in which file": "simulated-hexaglide.controller.toml",
-    }
-    for number in range(1, 20):
-        terminal.read_until("] ")
-        asked = process.out.rpartition("Question ")[2]
-        given = next((text for words, text in answers.items() if words.lower() in asked.lower()), "")
-        terminal.type(f"{given}\n")
-        if f"Question {number} of {number}:" in process.out:
-            break
-    assert ended(process, terminal) == 0
+    assert outcome.code == 0, outcome.err
     written = load_cell(cell_folder.path / "new.toml").settings
     assert written.name == "press 3"
     assert [gauge.port for gauge in written.gauges] == gauges

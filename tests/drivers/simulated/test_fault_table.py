@@ -205,7 +205,6 @@ def alarms_are_read_with_every_sample(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 async def test_every_fault_is_seen_or_harmless_as_the_table_says(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

@@ -148,7 +148,7 @@ def test_a_worker_with_another_version_is_named(tmp_path: Path, content: str, wo
     (tmp_path / "other" / "hexacell" / "__init__.py").write_text(content)
     with dask_processes(tmp_path, 0) as cluster:
         with pytest.raises(HexacellError, match=NO_WORKERS.format(cluster.address)):
-            dask_cluster(cluster.address, patience_s=0.5)()
+            dask_cluster(cluster.address, patience_s=3.0)()
         cluster.start_worker(PYTHONPATH=str(tmp_path / "other"))
         with pytest.raises(HexacellError, match=rf"tcp://127.0.0.1:\d+: .*{words}"):
             dask_cluster(cluster.address)()

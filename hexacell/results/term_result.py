@@ -18,6 +18,9 @@ from hexacell.measurements.records import joints_of
 
 ANY_WEIGHT_N = 100.0
 
+SURE = 5.0
+"""Standard deviations beyond which a coefficient is impossible, not off by chance."""
+
 CHANGE = 0.1
 """Share by which a coefficient may have changed since it was identified, one standard deviation."""
 
@@ -106,6 +109,22 @@ def known_terms(offered: Iterable[ModelTerm], results: Iterable[TermResult]) -> 
         for one in results
         if one.values is not None and one.sigma is not None and one.name in by_name
     )
+
+
+def impossible_terms(offered: Iterable[ModelTerm], results: Iterable[TermResult]) -> list[str]:
+    """Coefficients that are surely negative, or surely beyond what is stated of their term, in words.
+
+    Lost motion, clearance and compliance have no sign. A weight that pulls the other way than is stated has
+    all of them negative.
+    """
+    stated = {term.name: SURE * float(np.linalg.norm(term.spread, axis=1).max()) for term in offered}
+    return [
+        f"a {one.name} of {value:.3g} +- {sigma:.2g} {one.unit} (leg {leg})"
+        for one in results
+        if one.values is not None and one.sigma is not None
+        for leg, (value, sigma) in enumerate(zip(one.values, one.sigma, strict=True), start=1)
+        if value + SURE * sigma < 0.0 or value - SURE * sigma > stated.get(one.name, np.inf)
+    ]
 
 
 def corrections_for(

@@ -30,6 +30,7 @@ def gates(
     change_mm: float,
     largest_change_mm: float,
     expired: Sequence[str] | None = None,
+    impossible: Sequence[str] = (),
 ) -> tuple[AcceptanceGate, ...]:
     """All gates of an identification.
 
@@ -41,6 +42,7 @@ def gates(
             other frames are no other robot.
         largest_change_mm: what may change without a person.
         expired: instruments whose certificate had expired when the run began; None without certificates.
+        impossible: coefficients of what is not geometry that no machine has (:func:`impossible_terms`).
     """
     names = ", ".join(f"{one.name} ({one.change:+.2f} {one.unit})" for one in violations)
     checked = [
@@ -68,6 +70,10 @@ def gates(
             needs_cell_name=not change_mm <= largest_change_mm,
         ),
     ]
+    if impossible:
+        found = "; ".join(impossible)
+        sentence = f"No machine has {found}. Check own_weight_direction, own_weight_centre_mm and [model]."
+        checked.append(AcceptanceGate(name="physical", passed=False, sentence=sentence))
     if expired is not None:  # others do not accept a result by an instrument with an expired certificate
         sentence = "The certificates of the instruments were valid when the run began."
         if expired:

@@ -4,6 +4,7 @@ from typing import ClassVar, Literal
 
 from hexacell.cell.fields import GeometryDocument
 from hexacell.kinematics.corrections import Corrections
+from hexacell.results.term_result import impossible_terms
 from hexacell.results.written_geometry import TaskDisplacement, as_written
 from hexacell.verdict.acceptance_gates import AcceptanceGate, gates
 from procedures.resources.run_resources import RunResources
@@ -47,6 +48,7 @@ class Propose(Computation):
             residuals=result.residuals,
             change_mm=robot.largest_change(identified.geometry),
             largest_change_mm=settings.acceptance.largest_change_mm,
+            impossible=impossible_terms(robot.terms, result.terms),
             expired=started.expired if settings.certificates and started is not None else None,
         )
         written = as_written(settings, robot, identified.geometry, result.terms)

@@ -13,18 +13,19 @@ import pytest
 from hexacell.campaign.online_estimate import OnlineEstimator
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
+from hexacell.identification.terms.compliance import compliance
 from hexacell.identification.terms.finding import Finding
 from hexacell.kinematics.corrections import CorrectionKind
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
 from hexacell.results.absorbed_terms import absorbing
-from hexacell.results.term_result import corrections_for, known_terms, term_results
+from hexacell.results.term_result import corrections_for, impossible_terms, known_terms, term_results
 from hexacell.robot.model import Robot
 from hexacell.text.terms import terms_text
 from tests.benchmarks.worlds import budgets
 from tests.benchmarks.worlds.campaigns import Setting, setting
-from tests.benchmarks.worlds.not_geometry import NOTHING, effect_of, terms_of
+from tests.benchmarks.worlds.not_geometry import CENTRE_MM, NOTHING, effect_of, terms_of
 from tests.benchmarks.worlds.world import World
 
 SIZES = np.array([0.1, 0.06, 0.09, 0.05, 0.08, 0.07])
@@ -183,3 +184,18 @@ def test_a_config_gets_what_it_has_a_place_for_and_no_negative_compliance():
     assert {*left} == {"play", "compliance"}
     assert corrections.backlash == pytest.approx(SIZES, abs=0.05)
     assert not any(corrections.play_mm)
+
+
+def test_coefficients_that_no_machine_has_are_named() -> None:
+    """The weight is stated to pull upwards: legs would yield towards it."""
+    found = identified("compliance")
+    results = term_results(found)
+    assert impossible_terms(robot().terms, results) == []
+    base = robot().mechanism.normalize_frames(robot().drawing)[1].base
+    upwards = compliance(0.3, 100.0, base @ np.array([0.0, 0.0, 1.0]), CENTRE_MM)
+    wrong = identify(replace(robot(), terms=(upwards,)).problem(measured("compliance")))
+    named = impossible_terms((upwards,), term_results(wrong))
+    assert len(named) >= 3, "those of the others are not so well known"
+    assert named[0].startswith("a compliance of -0.")
+    less = replace(upwards, size=1e-3 * upwards.size)
+    assert len(impossible_terms((less,), results)) >= 3, "far beyond what is stated"

@@ -54,21 +54,14 @@ class Revisit:
     """Two visits of a pose.
 
     Attributes:
-        shown_mm: (3,) how what the gauges show differs.
-        change: likewise, less what the encoders show of it.
+        change: how what gauges and encoders show differs.
         by_joints: (3, 6) motion of the ball by the joints there.
         turned: (6,) how the directions of arrival differ.
     """
 
-    shown_mm: Array
     change: ReferenceChange
     by_joints: Array
     turned: Array
-
-    @property
-    def columns(self) -> Array:
-        """The change of the ball (3, 6) by reversal values of one."""
-        return np.asarray(-0.5 * self.by_joints * self.turned)
 
 
 def reversal_of(visits: Sequence[Revisit], known: Array, sigma: Array, unit: JointUnit) -> Reversal | None:
@@ -85,8 +78,10 @@ def reversal_of(visits: Sequence[Revisit], known: Array, sigma: Array, unit: Joi
     """
     if len(visits) < FEWEST_CHANGES:
         return None
-    columns = np.stack([one.columns for one in visits])
-    unexplained = np.stack([one.change.unexplained_mm for one in visits]) - columns @ known
+    columns = np.stack([-0.5 * one.by_joints * one.turned for one in visits])
+    beside_encoders = np.stack([one.change.unexplained_mm for one in visits])
+    seen_by_encoders = np.stack([one.by_joints @ one.change.joints for one in visits])
+    unexplained = beside_encoders - columns @ known
     weights = np.linalg.inv([one.change.covariance for one in visits])
     information = np.einsum("nij,nik,nkl->jl", columns, weights, columns)
     seen = np.einsum("nij,nik,nk->j", columns, weights, unexplained)
@@ -96,9 +91,9 @@ def reversal_of(visits: Sequence[Revisit], known: Array, sigma: Array, unit: Joi
         more = covariance @ seen / factor
         left = unexplained - columns @ more
         freedom = left.size - float(np.trace(covariance @ information) / factor)
-        factor = max(1.0, float(np.einsum("ni,nij,nj->", left, weights, left)) / freedom)
+        factor = max(1.0, float(np.einsum("ni,nij,nj->", left, weights, left) / freedom))
     joints, by_joints = known + more, visits[0].by_joints
-    shown = np.stack([one.shown_mm for one in visits])
+    shown = beside_encoders + seen_by_encoders
     # Of one of two visits. A reversal that is not there, but noise of encoders, would make it larger.
     from_one_side = np.minimum((shown**2).sum(axis=0), ((shown - columns @ joints) ** 2).sum(axis=0))
     scatter = np.sqrt(1.5 * from_one_side / freedom)

@@ -141,7 +141,7 @@ def reversal_by_repeats(plan: Plan, state: RunState, found: Identification) -> R
         ball = allowances.ball_at(reference)
         for row in contrasts(rows):
             change = allowances.since(reference, np.zeros(9), row[:9])
-            visits.append(Revisit(row[:3], change, ball.by_joints, row[9:]))
+            visits.append(Revisit(change, ball.by_joints, row[9:]))
     stated, unit = plan.settings.model.backlash, plan.settings.mechanism.words.joint_unit
     if found.terms is not None and BACKLASH in {term.name for term in found.terms.terms}:
         return reversal_of(visits, *found.terms.of(BACKLASH), unit)

@@ -21,8 +21,10 @@ def found(count: int, sides: tuple[int, ...], backlash: Any = BACKLASH, seed: in
     for _ in range(count):
         turned = np.subtract(*random.choice(sides, (2, 6))).astype(float)
         shown = -0.5 * by_joints @ (backlash * turned) + np.sqrt(2.0) * NOISE_MM * random.normal(size=3)
-        change: Any = SimpleNamespace(unexplained_mm=shown, covariance=2.0 * NOISE_MM**2 * np.eye(3))
-        visits.append(Revisit(shown, change, by_joints, turned))
+        change: Any = SimpleNamespace(
+            unexplained_mm=shown, joints=np.zeros(6), covariance=2.0 * NOISE_MM**2 * np.eye(3)
+        )
+        visits.append(Revisit(change, by_joints, turned))
     return reversal_of(visits, np.zeros(6), np.full(6, 0.1), JointUnit.MM)
 
 

@@ -58,14 +58,6 @@ def test_the_upper_limit_of_the_noise_holds_in_95_percent(visit) -> None:
     assert np.mean([visit().ratio_at_most >= 1.0 for _ in range(1000)]) == pytest.approx(0.95, abs=0.025)
 
 
-def test_play_of_the_sliders_is_found_with_its_size(visit) -> None:
-    found = [visit(sliders=0.05) for _ in range(60)]
-    named = Counter(one.source for one in found)
-    assert named[ScatterSource.JOINTS] >= 57
-    sizes = [one.excess for one in found if one.source is ScatterSource.JOINTS]
-    assert np.median(sizes) == pytest.approx(0.05, rel=0.15)
-
-
 @pytest.mark.sample("gauges1-*")
 @pytest.mark.parametrize(
     ("gauges", "source"),

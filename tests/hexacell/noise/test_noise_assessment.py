@@ -58,7 +58,6 @@ def readings(
     white: Any = QUIET,
     stops: float = STATED,
     sliders: float = 0.0,
-    encoders: float = 0.0,
     visits: int = 7,
     seed: int = 1,
     series: int = 40,
@@ -68,7 +67,6 @@ def readings(
     seen = 0.02 * random.standard_normal((visits, 6))
     ball = (seen + sliders * random.standard_normal((visits, 6))) @ jacobian(plan).T
     shown = np.concatenate([ball, seen], axis=1) + stops * random.standard_normal((visits, 9))
-    shown[:, 3:] += encoders * random.standard_normal((visits, 6))
     return NoiseReadings(
         reference=REFERENCE,
         series=np.broadcast_to(white, (9,)) * random.standard_normal((series, 9)),
@@ -121,16 +119,6 @@ def test_play_becomes_noise_of_the_encoders_and_the_repeatability_of_the_budget(
     assert line.size == pytest.approx(1e3 * measured.approaches.excess)
     assert line.source == "7 visits of the first reference"
     assert line.occurrence is Occurrence.STOPS_AT_WORK
-
-
-def test_errors_of_the_encoders_are_noise_and_no_repeatability(plan) -> None:
-    """At work the ball is where it was: they are in the records alone."""
-    measured = assess_noise(plan, readings(plan, encoders=0.06))
-    assert measured.approaches is not None
-    assert measured.approaches.source is ScatterSource.ENCODERS
-    expected = np.hypot(STATED, measured.approaches.excess)
-    assert records_of(measured)[3:] == pytest.approx(np.full(6, expected))
-    assert with_measured_noise(plan.settings, measured).uncertainty == plan.settings.uncertainty
 
 
 def test_what_is_less_than_stated_counts_only_where_the_cell_file_says_so(plan) -> None:

@@ -52,12 +52,6 @@ async def measure_noise(rig: Rig) -> events.NoiseMeasured:
     return found
 
 
-def noisy(rig: Rig, gauge: int, sigma_mm: float) -> None:
-    """Have one gauge show white noise, reading by reading."""
-    random, shown = np.random.default_rng(8), rig.gauges[gauge].shown
-    rig.gauges[gauge].shown = lambda: shown() + sigma_mm * random.standard_normal()
-
-
 @pytest.fixture
 def well_known(monkeypatch: pytest.MonkeyPatch) -> None:
     """The robot is known so well that no pilot poses are wanted."""
@@ -137,28 +131,6 @@ def test_the_quiet_simulation_is_as_noisy_as_stated(quiet: Rig) -> None:
     assert found.approaches is not None
     assert found.approaches.visits == 7
     assert 0.4 < found.approaches.ratio < 1.5
-
-
-async def test_a_noisy_gauge_is_named_and_weighted_down(asked: Rig, well_known: None) -> None:
-    noisy(asked, 1, 0.012)
-    found = await measure_noise(asked)
-    assert [one.name for one in found.noise.gauges if one.is_noisier] == ["gauge y"]
-    state = fold(read_journal(asked.folder.journal))
-    noise = asked.calibration.known(state).robot_of(state).noise
-    assert noise.gauges_mm[1] == pytest.approx(0.012 / np.sqrt(5.0), rel=0.6)
-    assert noise.gauges_mm[[0, 2]] == pytest.approx([0.0012, 0.0012])
-    assert asked.calibration.robot.noise.gauges_mm == pytest.approx(np.full(3, 0.0012))
-
-
-async def test_a_drifting_gauge_is_named_and_is_no_noise(asked: Rig, well_known: None) -> None:
-    shown = asked.gauges[2].shown
-    asked.gauges[2].shown = lambda: shown() + 0.003 * asked.clock.now()
-    found = await measure_noise(asked)
-    (drifting,) = (one for one in found.noise.gauges if one.drift)
-    assert drifting.name == "gauge z"
-    (series,) = happened(asked, events.StandstillRead)
-    assert drifting.drift == pytest.approx(series.gauges_mm[-1][2] - series.gauges_mm[0][2], rel=0.2)
-    assert not drifting.is_noisier
 
 
 async def test_encoders_that_show_other_places_each_time_are_told(make_rig: MakeRig) -> None:

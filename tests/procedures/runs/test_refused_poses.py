@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from drivers.errors import PoseRefused
-from hexacell.campaign import planner
 from hexacell.campaign.decisions import FIRST_PILOT
 from hexacell.cell.simulation import SoftLimits
 from hexacell.errors import ExitCode, IdentifiabilityError
@@ -112,15 +111,6 @@ async def test_a_refused_pilot_pose_is_replaced_by_another(make_rig) -> None:
     assert {refusal.axis for refusal in excluded(rig)} == {"x"}
     assert all(refusal.orientation >= FIRST_PILOT for refusal in excluded(rig))
     assert len(happened(rig, events.PilotTaken)) == 14
-    assert len(happened(rig, events.ReferenceRepeated)) == 6
-
-
-async def test_a_refused_visit_of_the_noise_measurement_is_replaced_by_another(make_rig, monkeypatch):
-    monkeypatch.setattr(planner, "is_well_known", lambda *_: True)
-    rig = make_rig(**limits(x=(-500.0, 100.5)), noise__revisits=6)
-    await run_until(rig, events.NoiseMeasured)
-    (refusal,) = excluded(rig)
-    assert (refusal.orientation, refusal.axis) == (0, "x")
     assert len(happened(rig, events.ReferenceRepeated)) == 6
 
 

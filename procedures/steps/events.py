@@ -16,6 +16,7 @@ from drivers.interfaces import DeviceIdentity
 from hexacell.cell.fields import GeometryDocument
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.config.interface import ControllerLimits
+from hexacell.kinematics.corrections import NO_CORRECTIONS, CorrectionKind, Corrections
 from hexacell.kinematics.mechanism import Branch
 from hexacell.results.result import AcceptedResult
 from hexacell.results.written_geometry import TaskDisplacement
@@ -80,7 +81,8 @@ class RunStarted(BaseEvent):
     the result that a check, the quick level or a length check starts from, if there is one.
     ``length_check`` is whether a calibration has one.
     ``joint_ranges`` are those of cell file and config together, mm; ``limits`` are what the controller's
-    config and its INI file state.
+    config and its INI file state. ``corrections`` are what the config had of these, and ``holds`` the kinds
+    that it has a place for.
     ``expired`` are the instruments whose certificate had expired on the day it began.
     ``config`` is the controller's config or its first file, ``further_configs`` are the others, and
     ``config_sha256`` is the fingerprint of all.
@@ -104,6 +106,8 @@ class RunStarted(BaseEvent):
     limits: ControllerLimits
     expired: tuple[str, ...] = ()
     further_configs: tuple[str, ...] = ()
+    corrections: Corrections = NO_CORRECTIONS
+    holds: tuple[CorrectionKind, ...] = ()
 
     def applied_to(self, state: RunState) -> RunState:
         return replace(state, started=self, position_unknown=True)

@@ -29,7 +29,8 @@ def started_robot(settings: CellSettings, started: RunStarted) -> Robot:
     """The robot by a cell's settings, which may be newer, and its controller when a run began."""
     parameters = settings.mechanism.parameters
     geometry = Geometry.of(parameters, started.controller)
-    commanding = ControllerGeometry(geometry, started.branch, started.limits)
+    holds = frozenset(started.holds)
+    commanding = ControllerGeometry(geometry, started.branch, started.limits, started.corrections, holds)
     return make_robot(settings, commanding, taught=Geometry.of(parameters, started.taught))
 
 

@@ -218,6 +218,8 @@ def run_started(
         accepted=calibration.accepted,
         joint_ranges=robot.limits.joint_ranges,
         limits=controller_geometry(cell).limits,
+        corrections=robot.corrections,
+        holds=tuple(sorted(robot.holds)),
         length_check=calibration.length_check,
         expired=cell.settings.expired_on(datetime.now(UTC).date()),
     )

@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 
+from hexacell.services.run.replay_run import replay
 from hexacell.text.terms import run_terms_text
 from hexacell.verdict.decision import Verdict
 from procedures.journal.journal import read_journal
@@ -43,3 +44,5 @@ async def test_the_controller_corrects_what_was_found_and_the_machine_passes(mak
     assert said.count("corrected by the controller") == 3
     assert " mm with the best geometry alone, " in said
     assert judged.verification.after_mm < 0.15 < judged.verification.before_mm
+    replayed = await replay(site.folder.path)
+    assert not replayed.differences, "a run that is resumed knows of the config's place for corrections"

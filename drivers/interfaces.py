@@ -159,22 +159,14 @@ class Controller(Device[DeviceIdentity], Protocol):
     """The robot's own controller."""
 
     async def prepare(self, permitted: StartupActions) -> None:
-        """Make it ready to move: out of emergency stop, enabled, homed. May move the machine.
-
-        Args:
-            permitted: the actions that may be taken for that.
+        """Make it ready to move by permitted actions: out of emergency stop, enabled, homed. It may move.
 
         Raises:
             drivers.errors.StartupNotPermitted: it needs an action that is not permitted.
         """
 
     async def move(self, pose: Pose, duration_s: float) -> None:
-        """Move straight to a pose; returns on arrival.
-
-        Args:
-            pose: the target, mm and deg, in the controller's own frames.
-            duration_s: shortest duration, s.
-        """
+        """Move straight to a pose in its own frames, in no less than ``duration_s``; returns on arrival."""
 
     async def position(self) -> ReportedPosition | None:
         """Where it has the robot now, pose and joints; None before it is homed, when nobody knows."""
@@ -189,9 +181,6 @@ class Controller(Device[DeviceIdentity], Protocol):
         """Make it reload its config; joints must not move. Afterwards it is as ``prepare`` leaves it.
 
         It is switched off and on for that, without permission where it was on before.
-
-        Args:
-            permitted: the actions that may be taken to make it ready again.
 
         Raises:
             drivers.errors.StartupNotPermitted: it needs another action; ``prepare`` may complete it.

@@ -142,12 +142,7 @@ def speaks_slcan(port: str, timeouts: SearchTimeouts = USUAL) -> bool:
 
 
 def search_bus(bus: Mapping[str, Any], timeouts: SearchTimeouts = USUAL) -> BusFindings:
-    """What sends unasked on a bus, and the nodes that answer, by node id.
-
-    Args:
-        bus: settings for ``can.Bus``.
-        timeouts: longest waits.
-    """
+    """What sends unasked on a bus (settings for ``can.Bus``), and the nodes that answer, by node id."""
     overheard = OverheardFrames()
     try:
         with closing(EncoderBus(bus, threading.Event(), accepts=overheard.accepts)) as opened:
@@ -196,12 +191,7 @@ ALONE = "Connect the one device whose node id is to be set, and no other"
 
 
 def set_node_id(bus: Mapping[str, Any], node: int, timeouts: SearchTimeouts = USUAL) -> int | None:
-    """Have the only device on a bus take a node id, and keep it; the id that it had, if it had one.
-
-    Args:
-        bus: settings for ``can.Bus``.
-        node: from 1 to 127.
-        timeouts: longest waits.
+    """Have the only device on a bus take a node id, 1 to 127, and keep it; the id that it had, if any.
 
     Raises:
         BusError: the bus cannot be opened, or has failed; or nothing has the id afterwards.

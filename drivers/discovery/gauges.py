@@ -75,10 +75,7 @@ async def search_port(
 ) -> PortFindings:
     """Ask in every protocol, then listen; the first that is answered is the port's.
 
-    Args:
-        port: a serial port, a pyserial URL, or a VISA resource, which is asked its name.
-        factories: drivers by protocol.
-        timeouts: longest waits.
+    That is a serial port, a pyserial URL, or a VISA resource, which is asked its name.
     """
     if VISA_SEPARATOR in port:
         return await _identify(port, timeouts.visa)

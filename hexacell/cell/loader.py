@@ -94,13 +94,7 @@ def config_paths(settings: CellSettings, folder: Path) -> tuple[Path, ...]:
 
 
 def load_cell(path: Path) -> Cell:
-    """Read and check a cell file.
-
-    Args:
-        path: the cell file, TOML; files that it names are relative to it.
-
-    Returns:
-        The cell: its settings with every default filled in, and the text with the line of each value.
+    """The cell of a TOML file: settings with every default filled in, and the text with all lines.
 
     Raises:
         FileError: it cannot be read, is no TOML, or has one mistake.

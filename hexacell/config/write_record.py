@@ -120,11 +120,7 @@ def recorded_write(
 ) -> Iterator[Recording]:
     """Record what the context writes into a config; nothing where it raises or writes nothing.
 
-    Args:
-        folder: that of the cell's runs.
-        paths: the files of the config.
-        layout: how the geometry is read from them.
-        cause: what the record says of the cause.
+    ``folder`` is that of the cell's runs, ``layout`` how the geometry is read from the files.
     """
     before = _version(paths, layout)
     recording = Recording()

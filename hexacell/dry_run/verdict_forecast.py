@@ -131,12 +131,8 @@ def stated_errors(
 ) -> Array:
     """How the error that will be stated changes (t, 6, k) by one standard deviation of each cause.
 
-    Args:
-        found: the identification.
-        updated: the identification by the held-out records as well.
-        first: the budget of ``found``.
-        second: the budget of ``updated``.
-        zeros: what is written of ``found``, where that is not all of it.
+    ``updated`` is the identification by the held-out records as well; ``first`` and ``second`` are the
+    budgets of the two. ``zeros`` are what is written of ``found``, where that is not all of it.
     """
     held = np.zeros_like(found.free_covariance)
     if zeros is not None:

@@ -155,16 +155,10 @@ class CommandedRobot:
     def commands_for(
         self, poses: PoseBatch, joints: Array, *, stages: Sequence[int] = COMMAND_STAGES
     ) -> ForwardResult:
-        """The commands that bring the robot to actual poses.
+        """The commands (n) that bring the robot to n actual poses with these joint variables (n, 6).
 
-        Args:
-            poses: n actual poses.
-            joints: joint variables (n, 6) there, in their unit.
-            stages: of the continuation.
-
-        Returns:
-            Commands (n). One is not found if the controller's geometry has no pose at these joint
-            variables, or has one only on another assembly mode or branch.
+        One is not found if the controller's geometry has no pose at these joint variables, or has one only
+        on another assembly mode or branch.
         """
         result = continue_solution(
             self.mechanism,

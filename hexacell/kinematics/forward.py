@@ -73,30 +73,12 @@ def assembly_mode(pose_jacobian: Array) -> Array:
 
 
 def modes_of(mechanism: Mechanism, geometry: Geometries, poses: PoseBatch, joints: Array) -> Array:
-    """:func:`assembly_mode` of n poses.
-
-    Args:
-        mechanism: of the robot.
-        geometry: one for all poses, or one for each.
-        poses: n poses.
-        joints: joint variables (n, 6), in their unit.
-
-    Returns:
-        Signs (n,).
-    """
+    """:func:`assembly_mode` (n,) of n poses at joint variables (n, 6); one geometry, or one for each."""
     return assembly_mode(mechanism.residual_and_jacobian(geometry, poses, joints)[1])
 
 
 def apply_twist(poses: PoseBatch, step: Array) -> PoseBatch:
-    """Poses displaced by twists.
-
-    Args:
-        poses: n poses.
-        step: twists (n, 6): translations, mm, then rotation vectors in the base frame, rad.
-
-    Returns:
-        The displaced poses (n).
-    """
+    """Poses (n) displaced by twists (n, 6): translations, mm, then rotation vectors in the base, rad."""
     return PoseBatch(
         poses.positions + step[..., :3], rotations.from_vector(step[..., 3:]) @ poses.rotations
     )
@@ -142,9 +124,6 @@ def forward_kinematics(
         max_steps: number of Newton steps.
         largest_contraction: poses of which a step is more than this share of the one before are not found;
             with less than 1, nor those whose first step is too large.
-
-    Returns:
-        The poses (n), and which of them were found.
     """
     positions, orientations = np.array(start.positions), np.array(start.rotations)
     found = np.zeros(len(joints), dtype=bool)
@@ -200,9 +179,6 @@ def continue_solution(
         start_geometry: one for all poses.
         start_joints: (n, 6); by default ``joints``, so that only the geometry changes.
         stage_counts: numbers of stages; the next one is tried for the poses where one fails.
-
-    Returns:
-        The poses (n), and which of them were found.
     """
     if start_joints is None:
         start_joints = joints

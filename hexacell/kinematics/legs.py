@@ -87,17 +87,7 @@ class Legs:
 
 
 def segment_distances(start: Array, end: Array, other_start: Array, other_end: Array) -> Array:
-    """The smallest distances of segments from others.
-
-    Args:
-        start: one end of each segment (3, ...), mm.
-        end: its other end.
-        other_start: one end of each other segment (3, ...), mm.
-        other_end: its other end.
-
-    Returns:
-        Distances (...,), mm.
-    """
+    """The smallest distances (...,) of segments from others, mm; each end is (3, ...)."""
     along, other, between = end - start, other_end - other_start, start - other_start
     a, e, b = _product(along, along), _product(other, other), _product(along, other)
     c, f = _product(along, between), _product(other, between)
@@ -125,15 +115,7 @@ def _clipped(values: Array, least: float, most: float) -> Array:
 
 
 def angles_between(vectors: Array, axes: Array) -> Array:
-    """Angles between directions.
-
-    Args:
-        vectors: unit vectors (..., 3).
-        axes: unit vectors (..., 3).
-
-    Returns:
-        Angles (...,), rad, from 0 to pi.
-    """
+    """Angles (...,), rad, from 0 to pi, between unit vectors (..., 3)."""
     return np.arccos(_clipped(_dot(vectors, axes), -1.0, 1.0))
 
 
@@ -143,14 +125,11 @@ def _dot(one: Array, other: Array) -> Array:
 
 
 def by_pose(b: Array, n: Array) -> Array:
-    """Derivatives of the legs' lengths by the pose.
+    """Derivatives ``[n, b x n]`` (n, 6, 6) of the legs' lengths by position, then rotation vector.
 
     Args:
         b: (n, 6, 3) from the ball to the platform joints, in the base frame, mm.
         n: (n, 6, 3) direction of each leg towards the platform, of length 1 where the leg closes.
-
-    Returns:
-        ``[n, b x n]`` (n, 6, 6), by the ball's position, mm, then by the rotation vector, rad.
     """
     jacobian = np.empty((*n.shape[:-1], 6))
     jacobian[..., :3] = n
@@ -164,16 +143,13 @@ def by_pose(b: Array, n: Array) -> Array:
 
 
 def axes_through(first: Array, second: Array, third: Array, part: str) -> Array:
-    """The axes that three joints fix.
+    """The axes (3, 3), in rows, that three joints fix.
 
     Args:
         first: the joint (3,), mm, from which x points to the second.
         second: (3,), mm.
         third: the joint (3,), mm, toward which y points; z is normal to the plane of all three.
         part: base or platform, for messages.
-
-    Returns:
-        The axes (3, 3), in rows.
 
     Raises:
         UsageError: the joints are in one line, or two of them at one place.

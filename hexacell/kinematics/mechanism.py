@@ -186,25 +186,18 @@ class Mechanism(Protocol):
     ) -> tuple[Array, Array]:
         """The constraints of the legs and their derivatives by the pose, for Newton's method.
 
-        Returns:
-            The length errors of the legs (n, 6), mm, zero where they close, and their derivatives
-            (n, 6, 6) by the ball's position, mm, and the rotation vector, rad.
+        The length errors of the legs (n, 6), mm, are zero where they close; their derivatives (n, 6, 6) are
+        by the ball's position, mm, and the rotation vector, rad.
         """
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
         """All derivatives of the constraints, off closed poses as well."""
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
-        """The inverse kinematics in closed form.
+        """The inverse kinematics in closed form: joint variables (n, 6); NaN out of a leg's reach.
 
-        Args:
-            geometry: of the robot.
-            branch: of each leg; empty for a mechanism without (:attr:`ParameterSet.has_branch
-                <hexacell.kinematics.parameters.ParameterSet.has_branch>`).
-            poses: n poses.
-
-        Returns:
-            Joint variables (n, 6), in their unit; NaN where a pose is out of a leg's reach.
+        ``branch`` is that of each leg; empty for a mechanism without (:attr:`ParameterSet.has_branch
+        <hexacell.kinematics.parameters.ParameterSet.has_branch>`).
         """
 
     def branch(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
@@ -234,33 +227,17 @@ class Mechanism(Protocol):
 
 
 def joint_zeros(mechanism: Mechanism, geometry: Geometry) -> Array:
-    """The encoders' zeros that a geometry contains.
+    """The encoders' zeros (6,) that a geometry in any frames contains, in the unit of the joint variables.
 
     A joint variable and the zero together are what does not depend on the encoder: the whole length of a
     Gough-Stewart platform's leg, the place of a slider in the base frame.
-
-    Args:
-        mechanism: of the robot.
-        geometry: of the robot, in any frames.
-
-    Returns:
-        The zeros (6,), in the unit of the joint variables.
     """
     zeros: Array = mechanism.encoder_zeros(geometry).T @ geometry.vector
     return zeros
 
 
 def inverse_kinematics(mechanism: Mechanism, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
-    """The inverse kinematics of poses that are all within reach.
-
-    Args:
-        mechanism: of the robot.
-        geometry: of the robot.
-        branch: of each leg; empty for a mechanism without.
-        poses: n poses.
-
-    Returns:
-        Joint variables (n, 6), in their unit.
+    """The joint variables (n, 6) of n poses that are all within reach, in their unit.
 
     Raises:
         ReachError: a pose is out of a leg's reach; the message names both.
@@ -273,16 +250,9 @@ def inverse_kinematics(mechanism: Mechanism, geometry: Geometry, branch: Branch,
 
 
 def free_parameter_derivatives(mechanism: Mechanism, geometry: Geometry) -> Array:
-    """Derivatives of the free parameters by all parameters of a geometry in frames of its own.
+    """Derivatives (P, p) of the free parameters by all parameters of a geometry in frames of its own.
 
     A parameter that the frame convention fixes moves the frames, and with them the others.
-
-    Args:
-        mechanism: of the robot.
-        geometry: of the robot, in any frames.
-
-    Returns:
-        Derivatives (P, p), in the units of both.
     """
     convention, vector = mechanism.convention, geometry.vector
 

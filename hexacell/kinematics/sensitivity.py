@@ -18,8 +18,14 @@ With the Gramian ``M = A A^T``, ``||A||_2 = ||M^2||_2^(1/4)``, which gives the c
 
     ||M^2||_F^(1/4) / 6^(1/8) <= ||A||_2 <= ||M^2||_F^(1/4).
 
-Only poses between these bounds need the decomposition. Source: Golub and Van Loan, Matrix Computations,
-4th ed. 2013 (norms, singular values).
+Only poses between these bounds need the decomposition.
+
+In all functions a ``geometry`` is one for all of n ``poses``, or one for each where a batch is allowed, in
+the convention's frames; ``joints`` (n, 6) are the joint variables there, in their unit. ``coordinates`` is
+``POSITION`` or ``POSE``, of which m derivatives follow, and a ``margin`` the least singular value,
+dimensionless.
+
+Source: Golub and Van Loan, Matrix Computations, 4th ed. 2013 (norms, singular values).
 """
 
 from dataclasses import dataclass, replace
@@ -39,7 +45,7 @@ POSE = 6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensitivity:
-    """Derivatives of a pose by the joint variables (n, m, 6) and the parameters (n, m, P).
+    """Derivatives of a pose by the joint variables (n, m, 6) and the parameters (n, m, P), a unit of these.
 
     Rows are the ball's position, mm, then, if m is 6, the rotation vector in the base frame, rad.
     """
@@ -71,16 +77,6 @@ def pose_sensitivity(
 ) -> Sensitivity:
     """Derivatives ``-J_pose^-1 J`` of n poses that close the mechanism, by joints and all parameters.
 
-    Args:
-        mechanism: of the robot.
-        geometry: of the robot.
-        poses: n poses.
-        joints: joint variables (n, 6), in their unit.
-        coordinates: ``POSITION`` or ``POSE``.
-
-    Returns:
-        Derivatives (n, m, 6) and (n, m, P), in mm and rad a unit of what they are by.
-
     Raises:
         LinAlgError: a pose is exactly at a singularity.
     """
@@ -104,16 +100,6 @@ def free_sensitivity(
 ) -> FreeSensitivity:
     """Derivatives of n poses that close the mechanism, by joints and free parameters.
 
-    Args:
-        mechanism: of the robot.
-        geometry: of the robot, in the frames of the convention.
-        poses: n poses.
-        joints: joint variables (n, 6), in their unit.
-        coordinates: ``POSITION`` or ``POSE``.
-
-    Returns:
-        Derivatives (n, m, 6) and (n, m, p), in mm and rad a unit of what they are by.
-
     Raises:
         LinAlgError: a pose is exactly at a singularity.
     """
@@ -129,21 +115,10 @@ def sensitivity_and_margin(
     coordinates: int,
     margin: float,
 ) -> tuple[FreeSensitivity, Mask]:
-    """:func:`free_sensitivity`, and at which of n poses there is a ``margin`` to singularities.
+    """:func:`free_sensitivity`, and at which of n poses (n,) there is a ``margin`` to singularities.
 
     One inverse of the pose Jacobian serves both. Exactly at a singularity, where there is no margin, the
     derivatives mean nothing.
-
-    Args:
-        mechanism: of the robot.
-        geometry: of the robot, in the frames of the convention.
-        poses: n poses.
-        joints: joint variables (n, 6), in their unit.
-        coordinates: ``POSITION`` or ``POSE``.
-        margin: least singular value, dimensionless.
-
-    Returns:
-        The derivatives, and a mask (n,).
     """
     linear = mechanism.derivatives(geometry, poses, joints)
     is_regular = np.ones(len(joints), dtype=bool)
@@ -179,15 +154,6 @@ def singularity_margin(
 
     Rotations are scaled by the platform's mean radius. With the value 0.1 there is a motion of the
     platform by 1 mm that changes the six leg lengths by 0.1 mm together (Euclidean norm).
-
-    Args:
-        mechanism: of the robot.
-        geometry: one for all poses, or one for each.
-        poses: n poses.
-        joints: joint variables (n, 6), in their unit.
-
-    Returns:
-        Singular values (n,), dimensionless.
     """
     jacobian = _dimensionless(mechanism, geometry, poses, joints)
     return np.asarray(np.linalg.svd(jacobian, compute_uv=False)[..., -1])
@@ -196,29 +162,14 @@ def singularity_margin(
 def has_singularity_margin(
     mechanism: Mechanism, geometry: Geometries, poses: PoseBatch, joints: Array, margin: float
 ) -> Mask:
-    """Whether :func:`singularity_margin` is at least a margin, computed faster.
-
-    Args:
-        mechanism: of the robot.
-        geometry: one for all poses, or one for each.
-        poses: n poses.
-        joints: joint variables (n, 6), in their unit.
-        margin: least singular value, dimensionless.
-
-    Returns:
-        A mask (n,).
-    """
+    """Whether :func:`singularity_margin` (n,) is at least a margin, computed faster."""
     return _has_margin(_dimensionless(mechanism, geometry, poses, joints), margin)
 
 
 def margin_and_mode(
     mechanism: Mechanism, geometry: Geometries, poses: PoseBatch, joints: Array, margin: float
 ) -> tuple[Mask, Array]:
-    """:func:`has_singularity_margin`, which has the same arguments, and the assembly modes.
-
-    Returns:
-        A mask (n,), and the :func:`assembly_mode` (n,) of each of n poses.
-    """
+    """:func:`has_singularity_margin`, and the :func:`assembly_mode` (n,) of each of n poses."""
     jacobian = _dimensionless(mechanism, geometry, poses, joints)
     return _has_margin(jacobian, margin), assembly_mode(jacobian)
 

@@ -142,11 +142,6 @@ def main() -> int:
 def restart(ini: Path, ended_s: float = ENDED_S, poll_s: float = POLL_S) -> subprocess.Popen[bytes]:
     """End LinuxCNC, if it runs, and start it with an INI file; the process that it is then.
 
-    Args:
-        ini: the INI file.
-        ended_s: longest wait for its end.
-        poll_s: pause between two looks.
-
     Raises:
         UsageError: it does not start linuxcncrsh, or a screen that cannot come back; it does not end, or it
             does not start.

@@ -36,15 +36,9 @@ class JointedLegs(Mechanism):
         return geometry[self.base_joint]
 
     def derivatives_at_base(self, geometry: Geometry, joints: Array, n: Array) -> tuple[Array, list[Array]]:
-        """Derivatives of the lengths by what moves the joints at the base's end.
+        """Derivatives of the lengths by joint variables (n, 6) and other parameters at the base (n, 6, c).
 
-        Args:
-            geometry: of the robot.
-            joints: joint variables (n, 6), in their unit.
-            n: (n, 6, 3) directions of the legs, from the platform to the base.
-
-        Returns:
-            Derivatives (n, 6) by the joint variables, and (n, 6, c) by the other parameters.
+        ``n`` (n, 6, 3) are the directions of the legs, from the platform to the base.
         """
         return -np.ones_like(joints), []
 

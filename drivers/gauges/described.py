@@ -10,8 +10,14 @@ import struct
 from typing import ClassVar
 
 from drivers.errors import WrongAnswer
-from drivers.gauges.plausibility import decimals_of
-from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec, Unit
+from drivers.gauges.protocol import (
+    DisplayedValue,
+    FrameRejected,
+    LineSettings,
+    ProtocolSpec,
+    Unit,
+    decimals_of,
+)
 from drivers.gauges.serial_gauge import SerialGauge, ValueOnlyGauge
 from drivers.gauges.streaming import Origin, StreamingGauge
 from drivers.serial.modbus_port import FUNCTIONS, REQUEST, ModbusPort

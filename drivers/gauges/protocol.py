@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
+from decimal import Decimal
 from enum import StrEnum
 
+from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError
 
 TERMINATOR = b"\r"
@@ -123,3 +125,118 @@ class GaugeState:
             if setting.compare and old is not None and new is not None and old != new:
                 found.append(f"{setting.name} {old} -> {new}")
         return tuple(found)
+
+
+TRAVEL_MARGIN = 1.1
+"""Instruments travel a little farther than they are sold for."""
+
+AGREEMENT_MM = 0.05
+"""Largest difference of readings that agree, mm, where nothing is known of the gauge."""
+
+ROUNDING_MM = 1e-9
+
+ALIKE_DIGITS, ALIKE_SHARE = 2.5, 0.1
+"""Readings are alike within so many of their last digits, or this share of what may differ at all."""
+
+MIDDLE_OF = 3
+
+INCH_DECIMALS = 5
+"""Decimals of a display set to inches. Six are no hint: public firmware for Digimatic sends mm so."""
+
+
+def decimals_of(resolution_mm: float) -> int:
+    """The decimals of a display in mm with this resolution: 3 for 0.001 and for 0.005."""
+    exponent = Decimal(str(resolution_mm)).normalize().as_tuple().exponent
+    return max(0, -int(exponent))
+
+
+class DisplayHistory:
+    """What one gauge has shown: every value must fit to the others.
+
+    The number of decimals holds from the first opening on: where a protocol does not name the unit, only it
+    tells inches from millimetres. The values hold from one opening to the next.
+    """
+
+    def __init__(self, settings: GaugeSettings) -> None:
+        zeros = 1.0 if settings.middle_mm is not None else 2.0  # its zero key may be pressed at either end
+        self._span_mm = TRAVEL_MARGIN * zeros * settings.travel_mm
+        self._travel_mm = settings.travel_mm
+        self._stated = settings.resolution_mm
+        self._decimals = None if self._stated is None else decimals_of(self._stated)
+        self.agreement_mm = AGREEMENT_MM if settings.agreement_mm is None else settings.agreement_mm
+        self._range: tuple[float, float] | None = None
+
+    def agreed(self, readings: Sequence[DisplayedValue]) -> DisplayedValue | None:
+        """What readings in a row agree on; None if the latest do not.
+
+        Two that differ by hardly more than the last digits are enough. Where they differ by more, one may
+        be damaged: a bit of the hundredths is 0.04 mm, and two such readings of five would outlast the
+        trimmed mean of a window. Then the middle one of three counts.
+        """
+        *_, last = readings
+        before = readings[-3:-1]
+        if not before or not self._differ_by_at_most(self.agreement_mm, before[-1], last):
+            return None
+        alike_mm = max(ALIKE_DIGITS * 10.0**-last.decimals, ALIKE_SHARE * self.agreement_mm)
+        if self._differ_by_at_most(alike_mm, before[-1], last):
+            return last
+        if len(before) < MIDDLE_OF - 1 or not self._differ_by_at_most(self.agreement_mm, *before, last):
+            return None
+        return sorted((*before, last), key=lambda one: one.value)[1]
+
+    @staticmethod
+    def _differ_by_at_most(limit_mm: float, *readings: DisplayedValue) -> bool:
+        values = [one.value for one in readings]
+        return max(values) - min(values) <= limit_mm + ROUNDING_MM
+
+    def begin(self) -> None:
+        """The gauge was opened: its zero may be another one."""
+        self._range = None
+
+    def is_inch(self, shown: DisplayedValue, set_to: Unit | None) -> bool:
+        """Whether a value is in inches.
+
+        What the answer names decides, then what the instrument says it is set to, or the stated resolution,
+        while the decimals are as before. Only where nothing else tells the unit, decimals do.
+        """
+        if shown.unit is not None:
+            return shown.unit is Unit.INCH
+        is_known = set_to is Unit.MM or self._stated is not None
+        if is_known and self._decimals in {None, shown.decimals}:
+            return False
+        return shown.decimals == INCH_DECIMALS
+
+    def other_decimals(self, shown: DisplayedValue) -> str | None:
+        """Why a value has another unit or resolution, in words; None if it has not."""
+        if self._decimals is None or shown.decimals == self._decimals:
+            return None
+        if self._stated is None:
+            before = f"where it showed {self._decimals} when it was first opened"
+        else:
+            before = f"and its resolution of {self._stated:g} mm has {self._decimals}"
+        return f"shows {shown.decimals} decimals ({shown.text}), {before}"
+
+    def beyond_travel(self, shown: DisplayedValue) -> str | None:
+        """Why a value is farther from the others than the plunger travels, in words; None if it is not."""
+        lowest, highest = self._extended(shown)
+        if highest - lowest <= self._span_mm:
+            return None
+        return (
+            f"shows {shown.text}, and values {highest - lowest:.3f} mm apart do not fit into its travel of "
+            f"{self._travel_mm:g} mm"
+        )
+
+    def keep_decimals(self, shown: DisplayedValue) -> None:
+        """Hold all values to come to the decimals of this one."""
+        self._decimals = shown.decimals
+
+    def add(self, shown: DisplayedValue) -> None:
+        """Take a value as one that was shown, as a second reading agreed with it.
+
+        A single one may be damaged, and would make right ones impossible.
+        """
+        self._range = self._extended(shown)
+
+    def _extended(self, shown: DisplayedValue) -> tuple[float, float]:
+        lowest, highest = self._range or (shown.value, shown.value)
+        return min(lowest, shown.value), max(highest, shown.value)

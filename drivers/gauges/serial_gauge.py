@@ -9,10 +9,10 @@ from dataclasses import asdict
 from typing import ClassVar, TypeVar
 
 from drivers.errors import GaugeAtEnd, GaugeSilent, GaugeUnsteady, WrongAnswer, WrongSetting, ZeroVoid
-from drivers.gauges.plausibility import DisplayHistory
 from drivers.gauges.protocol import (
     TERMINATOR,
     DisplayedValue,
+    DisplayHistory,
     FrameRejected,
     GaugeState,
     ImplausibleValue,

@@ -12,7 +12,6 @@ from functools import partial
 from typing import Any
 
 from drivers.errors import PortLost, WrongSetting
-from drivers.gauges.plausibility import decimals_of
 from drivers.gauges.protocol import (
     DisplayedValue,
     FrameRejected,
@@ -20,6 +19,7 @@ from drivers.gauges.protocol import (
     LineSettings,
     ProtocolSpec,
     Unit,
+    decimals_of,
 )
 from drivers.gauges.serial_gauge import SerialGauge
 from drivers.libraries import optional

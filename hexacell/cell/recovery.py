@@ -56,7 +56,10 @@ _REDO: tuple[Word, ...] = ("redo-set", "redo-set", "abort")
 
 
 class Escalations(Section):
-    """One escalation a kind of failure. Each ends with ask or abort, so that attempts are bounded."""
+    """One escalation a kind of failure, which ends with ask or abort, so that attempts are bounded.
+
+    A kind without one ends the run.
+    """
 
     @model_validator(mode="after")
     def _every_escalation_ends(self) -> Self:

@@ -27,7 +27,6 @@ from procedures.engine.commands import (
     invalidation_event,
 )
 from procedures.run.cancellation import cancel_and_wait
-from procedures.run.questions import Question
 from procedures.run.state import RunState, apply
 
 Result = TypeVar("Result")
@@ -103,13 +102,12 @@ class CommandLoop:
     ) -> None:
         self.flags = EngineFlags()
         self.watchers: list[Callable[[Status], None]] = []
-        self.question_watchers: list[Callable[[Question | None], None]] = []
         self._queue = queue
         self._broker = broker
         self._state = state
         self._reject = reject
         self._invalidations: list[Invalidation] = []
-        broker.on_change = self._note_question
+        broker.watchers.append(lambda question: self.set_flags(asking=question is not None))
 
     def set_flags(self, **flags: Any) -> None:  # noqa: ANN401 - the fields of EngineFlags
         """Set flags; watchers are called if the status changes by that."""
@@ -149,11 +147,6 @@ class CommandLoop:
         """What commands made invalid, oldest first, of the records of then; only once."""
         taken, self._invalidations = self._invalidations, []
         return taken
-
-    def _note_question(self) -> None:
-        self.set_flags(asking=self._broker.open is not None)
-        for watcher in self.question_watchers:
-            watcher(self._broker.open)
 
     async def _until_cancelled(self) -> None:
         while not self._take(await self._queue.next()):

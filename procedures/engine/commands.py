@@ -162,14 +162,14 @@ class QuestionBroker:
 
     Attributes:
         open: the question that waits for an answer, if one does.
-        on_change: called whenever a question is opened or closed.
+        watchers: called with every question that is opened, and with None when it is closed.
     """
 
     def __init__(self, operator: Operator) -> None:
         self._operator = operator
         self._answer: asyncio.Future[str | None] | None = None
         self.open: Question | None = None
-        self.on_change: Callable[[], None] = lambda: None
+        self.watchers: list[Callable[[Question | None], None]] = []
 
     def answer(self, answer: str | None) -> bool:
         """Answer the open question; False if none is open or this is no answer to it."""
@@ -196,7 +196,8 @@ class QuestionBroker:
 
     def _set_open(self, question: Question | None) -> None:
         self.open = question
-        self.on_change()
+        for watcher in self.watchers:
+            watcher(question)
 
 
 class UnattendedOperator:

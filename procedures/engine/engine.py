@@ -85,7 +85,7 @@ class Engine:
 
     def watch_questions(self, watcher: Callable[[Question | None], None]) -> None:
         """Call ``watcher`` with every question that is opened, and with None when it is closed."""
-        self._commands.question_watchers.append(watcher)
+        self._broker.watchers.append(watcher)
 
     def command(self, command: Command) -> None:
         """Give a command (:mod:`procedures.engine.commands`), from any thread."""

@@ -7,7 +7,7 @@ the cell file). Each attempt is an event, so the state of a run knows which acti
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from drivers import errors as device
 from hexacell.cell.recovery import Action, Escalations, FailureKind, RecoverySettings
@@ -92,21 +92,17 @@ class RecoveryPolicy:
     """The actions after the failures of a run.
 
     Attributes:
-        escalations: by kind; without any, every failure ends the run.
+        escalations: by kind; by default every failure ends the run.
         wait_s: cell seconds before a device is tried again.
     """
 
-    escalations: Escalations | None = None
+    escalations: Escalations = field(default_factory=Escalations)
     wait_s: float = 0.0
 
     @classmethod
     def of(cls, settings: RecoverySettings, *, attended: bool) -> RecoveryPolicy:
         """The policy that a cell file states."""
         return cls(settings.attended if attended else settings.unattended, settings.wait_s)
-
-    def action(self, kind: FailureKind, attempt: int) -> Action:
-        """The action after the ``attempt``-th failure of a kind, counted from 1."""
-        return Action.ABORT if self.escalations is None else self.escalations.action(kind, attempt)
 
 
 GIVE_UP = RecoveryPolicy()
@@ -120,7 +116,7 @@ def failed(
     failures: list[events.Failed] = []
     for kind in dict.fromkeys(kind_of(one) for one in causes_of(error)):
         attempt = state.attempts(kind, step) + 1
-        action = policy.action(kind, attempt)
+        action = policy.escalations.action(kind, attempt)
         failures.append(
             events.Failed(step=step, failure=kind, attempt=attempt, reason=str(error), action=action)
         )

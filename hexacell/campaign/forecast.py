@@ -34,19 +34,6 @@ SET_SIZES = (1, 2, 4, 8, 16, 32)
 """Numbers of records at a point whose gain is compared with their time."""
 
 
-@dataclass(frozen=True, slots=True)
-class PointRanking:
-    """Points compared.
-
-    Attributes:
-        gains_mm: what a record at each point is expected to take off the worst error, mm.
-        best: the point that takes most off the mean square error per minute.
-    """
-
-    gains_mm: Mapping[int, float]
-    best: int
-
-
 @dataclass(frozen=True, eq=False)
 class Forecaster:
     """Forecasts the error at the task poses.
@@ -121,11 +108,16 @@ class Forecaster:
             records, points = records + more, points + (not is_begun)
         return planned
 
-    def rank_points(self, state: CampaignState, belief: RobotBelief, points: Sequence[int]) -> PointRanking:
-        """Compare what records at some points would gain, and in what time."""
+    def rank_points(
+        self, state: CampaignState, belief: RobotBelief, points: Sequence[int]
+    ) -> tuple[Mapping[int, float], int]:
+        """What a record at each of some points is expected to take off the worst error, mm.
+
+        And the point that takes most off the mean square error per minute.
+        """
         error = self.task.error(belief)
         if error is None:
-            return PointRanking(dict.fromkeys(points, math.inf), points[0])
+            return dict.fromkeys(points, math.inf), points[0]
         error = TaskError(error.jacobian)  # that of all parameters, which records improve whatever is held
         information = PlannedInformation.of(self.sets_at(points), belief)
         gains: dict[int, float] = {}
@@ -134,7 +126,7 @@ class Forecaster:
             options = self._options(state, belief.joint_covariance, information, error, point)
             gains[point] = max((gain for gain, _ in options), default=0.0)
             rates[point] = max((rate for _, rate in options), default=-math.inf)
-        return PointRanking(gains, max(points, key=rates.__getitem__))
+        return gains, max(points, key=rates.__getitem__)
 
     def predicted_belief(self, belief: RobotBelief, state: CampaignState) -> RobotBelief:
         """What will be known once everything that is still planned is measured."""

@@ -300,9 +300,9 @@ class Plan:
         plan = self.settings.identification
         if not plan.least_gain_mm and not plan.choose_points:
             return points
-        ranking = self.forecaster.rank_points(state, self.estimate(state).belief, points)
-        worthwhile = [point for point in points if ranking.gains_mm[point] >= plan.least_gain_mm]
-        return [ranking.best] if plan.choose_points and ranking.best in worthwhile else worthwhile
+        gains_mm, best = self.forecaster.rank_points(state, self.estimate(state).belief, points)
+        worthwhile = [point for point in points if gains_mm[point] >= plan.least_gain_mm]
+        return [best] if plan.choose_points and best in worthwhile else worthwhile
 
     def _at_point(self, state: CampaignState, point: int) -> Decision:
         if reason := self._stopping.end_of_point(state, point):

@@ -101,5 +101,5 @@ class StoppingRules:
         if not self.settings.identification.choose_points or not others:
             return None
         belief = self.estimator.estimate(state.steering).belief
-        best = self.forecaster.rank_points(state, belief, [point, *others]).best
+        _, best = self.forecaster.rank_points(state, belief, [point, *others])
         return None if best == point else f"point {best} gains more in the same time"

@@ -160,7 +160,8 @@ def _others(
             )
             yield fact, settings, replace(controller, branch=signs)
     of_platform = tuple(kind.symbol for kind in parameters.kinds if kind.part is MachinePart.PLATFORM)
-    for order in _turned_orders():
+    for first, way in [*product(range(LEGS), (1, -1))][1:]:  # begun elsewhere, or the other way round
+        order = tuple((first + way * n) % LEGS for n in range(LEGS))
         fact = _of_drawing(
             cell,
             "the joints on the platform are in another order than the legs: they would fit in the order "
@@ -179,15 +180,6 @@ def _others(
         in_config = Geometry(parameters, lengths * controller.geometry.vector)
         fact = _of_drawing(cell, problem, "Write millimetres, or state unit_mm in the config's options")
         yield fact, _drawn_as(settings, drawn), replace(controller, geometry=in_config)
-
-
-def _turned_orders() -> Iterator[tuple[int, ...]]:
-    """The orders of a hexagon's corners that begin elsewhere or go round the other way."""
-    for first in range(LEGS):
-        for way in (1, -1):
-            order = tuple((first + way * n) % LEGS for n in range(LEGS))
-            if (first, way) != (0, 1):
-                yield order
 
 
 def _drawn_as(settings: CellSettings, drawing: Geometry) -> CellSettings:

@@ -153,20 +153,6 @@ def exposure_warnings(cell: Cell) -> Iterator[str]:
 
 def accepts_from_network(port: int, tables: Sequence[Path] = _TABLES) -> bool:
     """Whether something listens at ``port`` beyond the loopback addresses; False if that is not known."""
-    return any(not address.is_loopback for address in _listening_at(port, tables))
-
-
-def is_loopback(host: str) -> bool:
-    """Whether a network name or address is this computer's own."""
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host.lower() == "localhost"
-
-
-def _listening_at(
-    port: int, tables: Sequence[Path]
-) -> Iterator[ipaddress.IPv4Address | ipaddress.IPv6Address]:
     for table in tables:
         with suppress(OSError, ValueError, LookupError):
             for line in table.read_text(encoding="ascii").splitlines()[1:]:
@@ -175,4 +161,14 @@ def _listening_at(
                 if state == _LISTENING and int(own_port, 16) == port:
                     # As the kernel writes it: words of four bytes, each in the computer's own order.
                     words = [int(address[start : start + 8], 16) for start in range(0, len(address), 8)]
-                    yield ipaddress.ip_address(struct.pack(f"={len(words)}I", *words))
+                    if not ipaddress.ip_address(struct.pack(f"={len(words)}I", *words)).is_loopback:
+                        return True
+    return False
+
+
+def is_loopback(host: str) -> bool:
+    """Whether a network name or address is this computer's own."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host.lower() == "localhost"

@@ -3,17 +3,13 @@
 The metrics are in the text format of Prometheus, for the textfile collector of its node exporter.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from textwrap import indent
 from typing import Any
 
-from hexacell.services.history.cell_status import (
-    CellStatus,
-    FleetCell,
-    FleetRun,
-    UnreadableCell,
-    summary_of,
-)
+from hexacell.errors import HexacellError
+from hexacell.services.history.cell_status import CellStatus, FleetCell, FleetRun, summary_of
 from hexacell.text.documents import summary_document
 from hexacell.text.history import legs_text
 from hexacell.text.layout import error_with_u, figure_with_u, minute, verdict_word
@@ -42,21 +38,20 @@ HELP = {
 ESCAPES = str.maketrans({"\\": "\\\\", '"': '\\"', "\n": "\\n"})
 
 
-def status_text(found: Sequence[CellStatus], unreadable: Sequence[UnreadableCell] = ()) -> str:
+def status_text(found: Sequence[CellStatus], unreadable: Mapping[Path, HexacellError]) -> str:
     """A line a cell, and below it what needs somebody; the broken ones at the end."""
     head = f"{'cell':{LONGEST_NAME}} {'latest verdict':17} {'error, mm':16} {'when':17} in use"
     lines = [head, *(line for one in found for line in _lines(one))]
-    for one in unreadable:
-        lines.append(f"{one.path.name[:LONGEST_NAME]:{LONGEST_NAME}} cannot be read")
-        lines.append(indent(str(one.error), "  "))
+    for path, error in unreadable.items():
+        lines += [f"{path.name[:LONGEST_NAME]:{LONGEST_NAME}} cannot be read", indent(str(error), "  ")]
     return "\n".join(lines)
 
 
 def status_document(
-    found: Sequence[CellStatus], unreadable: Sequence[UnreadableCell] = ()
+    found: Sequence[CellStatus], unreadable: Mapping[Path, HexacellError]
 ) -> dict[str, Any]:
     """What ``status --json`` prints."""
-    broken = [{"cell": one.path, "error": str(one.error)} for one in unreadable]
+    broken = [{"cell": path, "error": str(error)} for path, error in unreadable.items()]
     return {"cells": [_document(one) for one in found], "unreadable": broken}
 
 

@@ -3,9 +3,8 @@
 import shlex
 from pathlib import Path
 
-from hexacell.errors import HexacellError
 from hexacell.services.run.calibration_run import RunRequest
-from hexacell.text.layout import duration, wrapped
+from hexacell.text.layout import wrapped
 from hexacell.text.screens.views import QuestionView
 from hexacell.text.verdict import teaching_line
 from procedures.calibration.calibration import Mode
@@ -33,16 +32,6 @@ def demo_opening(machine: str, config: Path) -> str:
         "The geometry in its controller's config is wrong by millimetres:\n"
         f"  {config}"
     )
-
-
-def clock_notice(factor: float) -> str:
-    """How fast the clock of a simulated cell runs."""
-    return f"The simulated cell's clock runs {factor:g} times as fast as real time."
-
-
-def next_try_text(refusal: HexacellError, wait_s: float) -> str:
-    """Why a run could not begin, and when it is tried again."""
-    return f"{refusal}\nnot begun; tried again in {duration(wait_s / 60.0)}"
 
 
 def resume_hint(request: RunRequest) -> str:

@@ -17,7 +17,8 @@ from hexacell.errors import ExitCode, HexacellError, UsageError
 from hexacell.run_process.live_devices import RunDeviceWatch
 from hexacell.runs.run_folder import new_run
 from hexacell.services.history.resumption import run_to_resume
-from hexacell.services.run.calibration_run import RunRequest, calibrate, is_unverified
+from hexacell.services.history.run_summary import state_of
+from hexacell.services.run.calibration_run import RunRequest, calibrate
 from hexacell.services.run.demo import prepare_demo
 from hexacell.services.run.event_stream import EventStream
 from hexacell.services.unattended import unattended_runs
@@ -30,7 +31,6 @@ from hexacell.text.run import (
     REPEATED,
     REPEATED_ALARM,
     UNVERIFIED,
-    clock_notice,
     closing_lines,
     demo_opening,
     resume_hint,
@@ -99,7 +99,7 @@ def _run_to_end(request: RunRequest, console: Console, stream: EventStream | Non
     """Carry out a run, its events copied to a ``stream`` if there is one, and print its outcome."""
     factor = request.cell.settings.timing.clock_factor
     if factor != 1.0:
-        console.print(clock_notice(factor))
+        console.print(f"The simulated cell's clock runs {factor:g} times as fast as real time.")
     if excluded := exclusions_text(request.cell.settings):
         console.print(wrapped(excluded))
     end = notified_afterwards(request, console, lambda: _run_and_repeat(request, console, stream))
@@ -151,7 +151,7 @@ def execute_run(request: RunRequest, console: Console, further: Sequence[Listene
             console.error(str(error).partition("\n")[0])
         if progress.has_started:
             console.print(resume_hint(request))
-        if (progress.has_started or request.resume) and is_unverified(request.folder):
+        if (progress.has_started or request.resume) and state_of(request.folder).is_unverified:
             console.error(UNVERIFIED)
         raise
 

@@ -8,13 +8,7 @@ from hexacell.cell.loader import is_cell_file
 from hexacell.cli.commands.cell import archive_url, cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, FileError, HexacellError, UsageError
-from hexacell.services.history.cell_status import (
-    CellStatus,
-    UnreadableCell,
-    cell_status,
-    fleet_cells,
-    publish_status,
-)
+from hexacell.services.history.cell_status import CellStatus, cell_status, fleet_cells, publish_status
 from hexacell.storage.atomic_files import write_atomically
 from hexacell.text.cells import fleet_document, fleet_text, metrics_text, status_document, status_text
 
@@ -37,10 +31,10 @@ def main(options: argparse.Namespace, console: Console) -> ExitCode:
     return ExitCode.USAGE if unreadable else ExitCode.DONE
 
 
-def _all(paths: Sequence[Path], console: Console) -> tuple[list[CellStatus], list[UnreadableCell]]:
+def _all(paths: Sequence[Path], console: Console) -> tuple[list[CellStatus], dict[Path, HexacellError]]:
     """Every cell; one that is broken hides no other. What a pattern names beside them is left out."""
     found: list[CellStatus] = []
-    unreadable: list[UnreadableCell] = []
+    unreadable: dict[Path, HexacellError] = {}
     for path in paths:
         if len(paths) > 1 and not is_cell_file(path):
             continue
@@ -49,7 +43,7 @@ def _all(paths: Sequence[Path], console: Console) -> tuple[list[CellStatus], lis
         except HexacellError as error:
             if len(paths) == 1:
                 raise
-            unreadable.append(UnreadableCell(path, error))
+            unreadable[path] = error
     return found, unreadable
 
 

@@ -23,7 +23,7 @@ from hexacell.services.unattended.schedules import (
 from hexacell.services.unattended.unattended_runs import local_now, refuse_quiet_hours, refused_start
 from hexacell.text import operation
 from hexacell.text.documents import schedule_document
-from hexacell.text.run import next_try_text
+from hexacell.text.layout import duration
 from procedures.steps import events
 
 
@@ -49,7 +49,7 @@ def begun_in_window(
             wait_s = refused_start(request, error, began, local_now())
             if wait_s is None:
                 raise
-            console.warn(next_try_text(error, wait_s))
+            console.warn(f"{error}\nnot begun; tried again in {duration(wait_s / 60.0)}")
             SignalCommands(console).run(asyncio.sleep(wait_s))
 
 

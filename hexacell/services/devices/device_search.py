@@ -21,7 +21,7 @@ from drivers.discovery.gauges import FoundGauge, PortFindings, probe_of, search_
 from drivers.serial.opening import SerialPortFound, serial_ports
 from hexacell.kinematics.parameters import LEGS, JointUnit
 from hexacell.plugins import Group, load, names
-from hexacell.services.devices.first_cell import GAUGE_AXES, CellDraft, Document, FoundKeys
+from hexacell.services.devices.first_cell import GAUGE_AXES, CellDraft, Document
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def draft_of(found: SearchFindings, path: Path) -> CellDraft:
         encoders = encoder_keys(nodes)
     if found.controller is not None:
         given |= {"host": found.controller.host, "port": str(found.controller.port)}
-    return CellDraft(path, given, FoundKeys(tuple(map(gauge_keys, gauges)), encoders))
+    return CellDraft(path, given, tuple(map(gauge_keys, gauges)), encoders)
 
 
 def found_gauges(found: SearchFindings) -> tuple[FoundGauge, ...]:

@@ -135,24 +135,17 @@ def _gauge_answers(number: int) -> Iterator[CellAnswer]:
     yield CellAnswer(f"sign {axis}", (*place, "sign"), "yes", _sign)
 
 
-@dataclass(frozen=True)
-class FoundKeys:
-    """Keys of a cell file whose values devices reported."""
-
-    gauges: tuple[Document, ...] = ()
-    encoders: Document = field(default_factory=dict)
-
-
 @dataclass
 class CellDraft:
     """A cell file that is being made at ``path``; ``given`` are the answers so far, by name.
 
-    ``found`` is what devices reported and nobody is asked: keys of the gauges, and of the encoders.
+    ``found_gauges`` and ``found_encoders`` are keys whose values devices reported, and nobody is asked.
     """
 
     path: Path
     given: dict[str, str] = field(default_factory=dict)
-    found: FoundKeys = field(default_factory=FoundKeys)
+    found_gauges: tuple[Document, ...] = ()
+    found_encoders: Document = field(default_factory=dict)
 
     def answers(self) -> tuple[CellAnswer, ...]:
         """All that is asked, in order."""
@@ -225,9 +218,9 @@ class CellDraft:
             "verification": {"points": []},
             **{name: bundled[name] for name in KEPT_SECTIONS},
         }
-        for gauge, keys in zip(document["gauges"], self.found.gauges, strict=False):
+        for gauge, keys in zip(document["gauges"], self.found_gauges, strict=False):
             gauge.update(keys)
-        document["encoders"] |= self.found.encoders
+        document["encoders"] |= self.found_encoders
         for answer in self.answers():
             if answer.name in given:
                 answer.enter(document, given[answer.name])

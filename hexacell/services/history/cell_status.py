@@ -10,14 +10,12 @@ from collections.abc import Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from pydantic import ValidationError
 
 from hexacell.cell.fields import Frozen, Name, Text
 from hexacell.cell.loader import Cell
-from hexacell.errors import HexacellError
 from hexacell.runs.cell_lock import lock_holder
 from hexacell.runs.run_folder import DocumentKind, StampedDocument, runs_folder
 from hexacell.services.history.drift_history import DriftHistory, drift_history
@@ -66,14 +64,6 @@ class CellStatus:
     def worst_share(self) -> tuple[str, float] | None:
         """The parameter whose cumulative sum is nearest to its limit, and how near; None without runs."""
         return max(self.drift.shares, key=lambda one: one[1], default=None)
-
-
-@dataclass(frozen=True, slots=True)
-class UnreadableCell:
-    """A cell whose file, or that of its controller, cannot be used."""
-
-    path: Path
-    error: HexacellError
 
 
 def cell_status(cell: Cell) -> CellStatus:

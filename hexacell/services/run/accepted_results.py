@@ -1,6 +1,5 @@
 """The last accepted result of a cell: what is known of the geometry that its controller runs with."""
 
-from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
@@ -10,7 +9,7 @@ from hexacell.config.change import Receipt
 from hexacell.config.layout import fingerprint
 from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
-from hexacell.results.result import AcceptedResult, LengthResult
+from hexacell.results.result import AcceptedResult, IdentificationResult, LengthResult
 from hexacell.runs.run_folder import RunFolder, run_folders
 from hexacell.services.history.journal_soundness import read_sound
 from hexacell.services.history.recorded_cell import started_robot
@@ -21,7 +20,6 @@ from procedures.calibration.calibration import Calibration, Mode
 from procedures.run.keys import Phase
 from procedures.run.readings import mean_leg_temperatures
 from procedures.run.state import RunState
-from procedures.steps import events
 
 
 def last_accepted_result(cell: Cell) -> AcceptedResult | None:
@@ -33,23 +31,15 @@ def last_accepted_result(cell: Cell) -> AcceptedResult | None:
         FileError: the controller's config cannot be read.
     """
     written = fingerprint(*cell.config_paths)
-    found = (_accepted(cell, folder, written) for folder in run_folders(cell))
-    newest = max((one for one in found if one is not None), key=lambda one: one.at, default=None)
-    return None if newest is None else _result(cell, newest)
+    found = {run: one for run in run_folders(cell) if (one := _accepted(cell, run, written)) is not None}
+    newest = max(found, key=lambda run: found[run][0], default=None)
+    return None if newest is None else _result(cell, newest.path, *found[newest])
 
 
-@dataclass(frozen=True, slots=True)
-class _AcceptedRun:
-    """A run whose result stayed in the controller, and when it ended."""
-
-    path: Path
-    at: datetime
-    state: RunState
-    identified: events.Identified
-
-
-def _accepted(cell: Cell, folder: RunFolder, sha256: str) -> _AcceptedRun | None:
-    """A run, if it wrote the config with this fingerprint, and its result stayed in the controller."""
+def _accepted(
+    cell: Cell, folder: RunFolder, sha256: str
+) -> tuple[datetime, RunState, IdentificationResult] | None:
+    """End and content of a run that wrote the config with this fingerprint, if its result stayed there."""
     try:
         if Receipt.of(folder.path).sha256_after != sha256:
             return None
@@ -59,7 +49,7 @@ def _accepted(cell: Cell, folder: RunFolder, sha256: str) -> _AcceptedRun | None
         return None
     if state.identified is None or not _is_accepted(state, is_applied_later=is_applied_later):
         return None
-    return _AcceptedRun(folder.path, entries[-1].at, state, state.identified)
+    return entries[-1].at, state, state.identified.result
 
 
 def _is_accepted(state: RunState, *, is_applied_later: bool) -> bool:
@@ -81,20 +71,20 @@ def _is_accepted(state: RunState, *, is_applied_later: bool) -> bool:
     return holds and (is_kept or is_applied_later)
 
 
-def _result(cell: Cell, accepted: _AcceptedRun) -> AcceptedResult:
-    terms = tuple(one for one in accepted.identified.result.terms if one.is_taken)
+def _result(
+    cell: Cell, path: Path, at: datetime, state: RunState, result: IdentificationResult
+) -> AcceptedResult:
+    terms = tuple(one for one in result.terms if one.is_taken)
+    readings = [sample.reading for sample in state.samples(Phase.IDENTIFY)]
     return AcceptedResult(
-        run=str(accepted.path),
-        at=accepted.at,
-        covariance=accepted.identified.result.covariance,
-        effects=_effects(cell, accepted.state),
-        identified=accepted.identified.result.geometry if terms else None,
+        run=str(path),
+        at=at,
+        covariance=result.covariance,
+        effects=_effects(cell, state),
+        identified=result.geometry if terms else None,
         terms=terms,
-        length=_length(accepted.state),
-        leg_temperatures_c=mean_leg_temperatures(
-            cell.settings.thermometers,
-            [sample.reading for sample in accepted.state.samples(Phase.IDENTIFY)],
-        ),
+        length=_length(state),
+        leg_temperatures_c=mean_leg_temperatures(cell.settings.thermometers, readings),
     )
 
 

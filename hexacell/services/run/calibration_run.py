@@ -20,7 +20,6 @@ from hexacell.services.devices.device_setup import Connected, device_addresses, 
 from hexacell.services.history.journal_soundness import require_sound
 from hexacell.services.history.recorded_cell import started_robot, with_changes
 from hexacell.services.history.resumption import require_own_run
-from hexacell.services.history.run_summary import state_of
 from hexacell.services.run.accepted_results import last_accepted_result
 from hexacell.services.write_back.config_rollback import require_no_provisional
 from hexacell.storage.atomic_files import read_text, remove_stale_temporaries, write_atomically
@@ -158,11 +157,6 @@ async def _position_failures(cell: Cell, connected: Connected) -> list[HexacellE
     config = CurrentConfig(cell.config_paths, ConfigLayout.of(cell.settings))
     check = PositionCheck(connected.settings, connected.devices, connected.clock, config)
     return await position_failures(check)
-
-
-def is_unverified(folder: RunFolder) -> bool:
-    """Whether a run, as far as its journal can be read, left a written geometry without a verdict."""
-    return state_of(folder).is_unverified
 
 
 async def _run(

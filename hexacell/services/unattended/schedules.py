@@ -93,7 +93,6 @@ def scheduled_run(
         on_failure=on_failure,
     )
     _require_possible(cell, run)
-    _require_not_quiet(cell, hour, minute)
     return run
 
 
@@ -170,13 +169,11 @@ def _require_possible(cell: Cell, run: ScheduledRun) -> None:
             f"'{run.on_failure}' is no name of a unit", action="Write it as mail-me@%n.service"
         )
 
-
-def _require_not_quiet(cell: Cell, hour: int, minute: int) -> None:
-    stated, at = cell.settings.unattended, 60 * hour + minute
-    for begin, length in stated.quiet_spans:
+    at = 60 * run.hour + run.minute
+    for begin, length in settings.unattended.quiet_spans:
         if (at - begin) % DAY_MINUTES < length:
             raise UsageError(
-                f"{hour:02}:{minute:02} is in the quiet hours of the cell",
+                f"{run.hour:02}:{run.minute:02} is in the quiet hours of the cell",
                 subject=cell.path,
                 action="Choose another time, or change quiet_hours in [unattended]",
             )

@@ -146,14 +146,9 @@ def pdf_of(report: Report) -> bytes:
             "a PDF needs the package typst",
             action="Install hexacell[pdf], or name a file that ends in .html",
         ) from error
-    return typst.compile(
-        typst_of(report).encode(), format="pdf", pdf_standards=PDF_STANDARD, ignore_system_fonts=True
-    )
-
-
-def typst_of(report: Report) -> str:
-    """The markup of a report; every text is a string literal, never markup."""
-    return rendered("report.typ.j2", _literal, is_markup=False, report=report)
+    # Every text is a string literal, never markup.
+    markup = rendered("report.typ.j2", _literal, is_markup=False, report=report).encode()
+    return typst.compile(markup, format="pdf", pdf_standards=PDF_STANDARD, ignore_system_fonts=True)
 
 
 def _literal(value: object) -> object:

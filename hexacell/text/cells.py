@@ -10,7 +10,6 @@ from typing import Any
 
 from hexacell.errors import HexacellError
 from hexacell.services.history.cell_status import CellStatus, FleetCell, FleetRun, summary_of
-from hexacell.text.documents import summary_document
 from hexacell.text.history import legs_text
 from hexacell.text.layout import error_with_u, figure_with_u, minute, verdict_word
 from hexacell.verdict.decision import Verdict
@@ -47,14 +46,6 @@ def status_text(found: Sequence[CellStatus], unreadable: Mapping[Path, HexacellE
     return "\n".join(lines)
 
 
-def status_document(
-    found: Sequence[CellStatus], unreadable: Mapping[Path, HexacellError]
-) -> dict[str, Any]:
-    """What ``status --json`` prints."""
-    broken = [{"cell": path, "error": str(error)} for path, error in unreadable.items()]
-    return {"cells": [_document(one) for one in found], "unreadable": broken}
-
-
 def metrics_text(found: Sequence[CellStatus]) -> str:
     """All samples, those of one metric together, each with its help."""
     samples: dict[str, list[str]] = {name: [] for name in HELP}
@@ -89,7 +80,8 @@ def _lines(one: CellStatus) -> Iterator[str]:
         yield f"  leg {legs_text(last)} changed, {noticed}; hexacell history --drift shows more"
 
 
-def _document(one: CellStatus) -> dict[str, Any]:
+def status_document(one: CellStatus) -> dict[str, Any]:
+    """What ``status --json`` prints of a cell."""
     judged, worst = summary_of(one.judged), one.worst_share
     position = judged.position
     return {
@@ -156,11 +148,6 @@ def _fleet_cell_lines(one: FleetCell) -> Iterator[str]:
         yield "  the robot has changed; hexacell history --drift on its computer shows more"
 
 
-def fleet_document(cells: Sequence[FleetCell]) -> dict[str, Any]:
-    """What ``status --archive URL --json`` prints."""
-    return {"cells": [one.model_dump(mode="json") | {"overdue": one.is_overdue} for one in cells]}
-
-
 def fleet_history_text(runs: Sequence[FleetRun]) -> str:
     """A line a run of an archive."""
     if not runs:
@@ -170,16 +157,6 @@ def fleet_history_text(runs: Sequence[FleetRun]) -> str:
         verdict, error = verdict_word(one.summary.verdict), error_with_u(one.summary.accuracy)
         lines.append(_fleet_columns(one.cell, one.host, verdict, error, minute(one.summary.ended)))
     return "\n".join(lines)
-
-
-def fleet_history_document(runs: Sequence[FleetRun]) -> dict[str, Any]:
-    """What ``history --archive URL --json`` prints without a cell."""
-    return {
-        "runs": [
-            {"cell": one.cell, "host": one.host, "run": one.name, **summary_document(one.summary)}
-            for one in runs
-        ]
-    }
 
 
 def _fleet_columns(cell: str, host: str, verdict: str, error: str, when: str) -> str:

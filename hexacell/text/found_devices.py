@@ -1,7 +1,6 @@
 """Devices that were found, in words and as text for a cell file; and one that was watched."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
 from typing import Any
 
 import tomlkit
@@ -17,11 +16,6 @@ from hexacell.text.planning import device_line
 
 AXES = "xyz"
 MOST_FRAMES = 12
-
-
-def search_document(found: device_search.SearchFindings) -> dict[str, Any]:
-    """All that was found, and ``cell``: the text for a cell file."""
-    return asdict(found) | {"cell": "\n".join(cell_lines(found))}
 
 
 def search_lines(found: device_search.SearchFindings) -> Iterator[str]:
@@ -167,11 +161,6 @@ MEANING = {
 }
 NOISY = 3.0
 """A scatter of so many times what the cell file states is reported."""
-
-
-def diagnosis_document(found: DeviceDiagnosis) -> dict[str, Any]:
-    """All figures."""
-    return {**asdict(found), "is_usable": found.is_usable}
 
 
 def diagnosis_lines(found: DeviceDiagnosis) -> Iterator[str]:

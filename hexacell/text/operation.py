@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from hexacell.cell.operation import NotificationSettings, UnattendedSettings, scheme_of
 from hexacell.text.layout import wrapped
@@ -49,17 +49,6 @@ def _dropped(outcome: NotifyOutcome) -> list[str]:
     return [f"{outcome.dropped} notices were given up: too old, or too many"] if outcome.dropped else []
 
 
-def notify_document(outcome: NotifyOutcome) -> dict[str, Any]:
-    """The JSON document of ``notify --send --json`` and ``--test --json``."""
-    return {
-        "told": [
-            {"name": one.name, "told": one.sent, "wait": one.wait, "problem": one.problem}
-            for one in outcome.deliveries
-        ],
-        "dropped": outcome.dropped,
-    }
-
-
 def notifications_text(settings: Sequence[NotificationSettings], waiting: Sequence[PendingNotice]) -> str:
     """Who is notified of what, and what waits."""
     lines = [
@@ -70,13 +59,6 @@ def notifications_text(settings: Sequence[NotificationSettings], waiting: Sequen
     ]
     lines += [f"waits for {one.to}: {one.notice.at:%Y-%m-%d %H:%M} {one.notice.line}" for one in waiting]
     return "\n".join(lines) or NOBODY
-
-
-def notifications_document(
-    settings: Sequence[NotificationSettings], waiting: Sequence[PendingNotice]
-) -> dict[str, Any]:
-    """The JSON document of ``notify --json``, without addresses."""
-    return {"notifications": [{"name": one.name, "on": one.on} for one in settings], "waiting": waiting}
 
 
 def written_schedule_text(schedule: Schedule, run: ScheduledRun, stated: UnattendedSettings) -> str:

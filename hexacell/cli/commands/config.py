@@ -15,7 +15,7 @@ from hexacell.runs.run_folder import RunFolder
 from hexacell.services.write_back.config_rollback import roll_back_config
 from hexacell.services.write_back.proposals import apply_proposal, read_proposal
 from hexacell.text.config_changes import applied_text, rollback_text, versions_text
-from hexacell.text.documents import applied_document, rollback_document
+from hexacell.text.verdict import teaching_sentence
 from procedures.engine.commands import UnattendedOperator
 
 
@@ -27,7 +27,18 @@ def apply_run(options: argparse.Namespace, console: Console) -> ExitCode:
     operator = TerminalOperator(console) if is_interactive() else UnattendedOperator()
     with _edits_shown(console):
         applied = asyncio.run(apply_proposal(proposal, operator, reason=options.reason))
-    console.show(applied_document(applied), applied_text(applied))
+    change, moved = proposal.change, proposal.displacement
+    document = {
+        "applied": bool(applied.by),
+        "by": applied.by or None,
+        "config": change.path,
+        "further_configs": change.paths[1:],
+        "run": proposal.folder.path,
+        "sha256": change.sha256_after,
+        "teach": teaching_sentence(moved) or None,
+        "recorded": not applied.unrecorded,
+    }
+    console.show(document, applied_text(applied))
     return ExitCode.DONE
 
 
@@ -35,7 +46,15 @@ def rollback_config(options: argparse.Namespace, console: Console) -> ExitCode:
     """Undo the latest write, or restore what a run wrote."""
     with _edits_shown(console):
         done = roll_back_config(cell_at(options.cell, console), options.to, reason=options.reason)
-    console.show(rollback_document(done), rollback_text(done))
+    document = {
+        "restored": bool(done.change),
+        "config": done.paths[0],
+        "further_configs": done.paths[1:],
+        "from": done.restored[0],
+        "undone": done.undone,
+        "recorded": not done.unrecorded,
+    }
+    console.show(document, rollback_text(done))
     return ExitCode.DONE
 
 

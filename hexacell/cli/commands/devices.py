@@ -3,6 +3,7 @@
 import argparse
 import asyncio
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -54,12 +55,13 @@ def _search(options: argparse.Namespace, console: Console) -> ExitCode:
     buses = [_bus(words) for words in options.can]
     address = _address(options.controller)
     found = asyncio.run(search_devices(options.ports, buses, options.bitrate, address))
-    console.document(found_devices.search_document(found))
+    text = "\n".join(found_devices.cell_lines(found))
+    console.document(asdict(found) | {"cell": text})
     for line in found_devices.search_lines(found):
         console.print(wrapped(line))
     if options.write is not None:
         return _write(found, options.write, console)
-    if text := "\n".join(found_devices.cell_lines(found)):
+    if text:
         console.print(f"\nFor your cell file:\n\n{text}")
     return ExitCode.DONE
 
@@ -94,7 +96,7 @@ def _watch(options: argparse.Namespace, console: Console) -> ExitCode:
         raise UsageError("--diagnose wants the cell of the device", action="Add --cell CELL")
     cell = cell_at(options.cell, console)
     found = asyncio.run(diagnose(cell, options.diagnose, options.seconds))
-    console.document(found_devices.diagnosis_document(found))
+    console.document({**asdict(found), "is_usable": found.is_usable})
     for line in found_devices.diagnosis_lines(found):
         console.print(wrapped(line))
     return ExitCode.DONE if found.is_usable else ExitCode.HARDWARE

@@ -1,14 +1,18 @@
 """``hexacell history``: the runs of a cell, two of them compared, what drifts, and writes of its config."""
 
 import argparse
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
 
 from hexacell.cell.loader import Cell
 from hexacell.cli.commands.cell import archive_url, cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
+from hexacell.results.run_comparison import ParameterTrend, RunComparison
 from hexacell.runs.run_folder import RunFolder, find_run
 from hexacell.services.history.cell_status import fleet_runs
-from hexacell.services.history.drift_history import drift_history
+from hexacell.services.history.drift_history import DriftHistory, FoundChange, drift_history
 from hexacell.services.history.past_runs import (
     compare_runs,
     delete_runs,
@@ -17,12 +21,11 @@ from hexacell.services.history.past_runs import (
     retention,
 )
 from hexacell.services.history.run_index import RunIndex
-from hexacell.services.write_back.config_history import config_history
-from hexacell.text import documents
-from hexacell.text.cells import fleet_history_document, fleet_history_text
+from hexacell.services.write_back.config_history import ConfigWrite, config_history
+from hexacell.text.cells import fleet_history_text
 from hexacell.text.config_changes import config_history_text
 from hexacell.text.history import comparison_text, drift_text, history_text, retention_text, watch_text
-from hexacell.text.line_face import story_text
+from hexacell.text.line_face import run_story, story_text
 from procedures.journal.journal import read_entries
 
 MOST_DAYS = 36525.0
@@ -37,7 +40,7 @@ def main(options: argparse.Namespace, console: Console) -> ExitCode:
     cell = cell_at(options.cell, console)
     if options.compare is not None:
         compared = compare_runs(cell, *options.compare)
-        console.show(documents.comparison_document(*compared), comparison_text(*compared))
+        console.show(_comparison_document(*compared), comparison_text(*compared))
     elif options.show is not None:
         _show(find_run(cell, options.show), console)
     elif options.keep is not None:
@@ -48,12 +51,16 @@ def main(options: argparse.Namespace, console: Console) -> ExitCode:
         index = _index(cell, options, console)
         found, watched = parameter_trends(cell, past_runs(cell, index), index), drift_history(cell, index)
         console.show(
-            documents.drift_document(found, watched),
+            _drift_document(found, watched),
             "\n".join(filter(None, [watch_text(watched), drift_text(found)])),
         )
     else:
         runs = past_runs(cell, _index(cell, options, console))
-        console.show(documents.history_document(runs), history_text(runs))
+        listed = [
+            {"run": one.folder.path, "in_controller": one.is_in_controller, **one.summary.document}
+            for one in runs
+        ]
+        console.show({"runs": listed}, history_text(runs))
     return ExitCode.DONE
 
 
@@ -70,7 +77,8 @@ def _fleet(options: argparse.Namespace, console: Console) -> ExitCode:
     if options.archive is None or is_one_cells:
         raise UsageError("no cell is named", action="Name a cell file, or --archive URL for all")
     runs = fleet_runs(archive_url(options.archive))
-    console.show(fleet_history_document(runs), fleet_history_text(runs))
+    listed = [{"cell": one.cell, "host": one.host, "run": one.name, **one.summary.document} for one in runs]
+    console.show({"runs": listed}, fleet_history_text(runs))
     return ExitCode.DONE
 
 
@@ -81,10 +89,13 @@ def _keep(cell: Cell, options: argparse.Namespace, console: Console) -> None:
     found = retention(cell, options.keep, _index(cell, options, console))
     if options.delete:
         delete_runs(cell, found.leaving)
-    console.show(
-        documents.retention_document(found, is_deleted=options.delete),
-        retention_text(found, is_deleted=options.delete),
-    )
+    document = {
+        "before": found.before,
+        "deleted": options.delete,
+        "runs": [run.folder.path for run in found.leaving],
+        "kept": [{"run": run.folder.path, "reason": reason} for run, reason in found.kept],
+    }
+    console.show(document, retention_text(found, is_deleted=options.delete))
 
 
 def _changes(cell: Cell, console: Console) -> None:
@@ -92,11 +103,60 @@ def _changes(cell: Cell, console: Console) -> None:
     found = config_history(cell)
     for line in found.damaged:
         console.warn(f"{found.path}, line {line}: this record is torn, damaged or newer, and left out")
-    console.show(documents.config_history_document(found), config_history_text(found))
+    writes = [_write_document(one) for one in found.writes]
+    console.show({"changes": writes, "damaged_lines": found.damaged}, config_history_text(found))
 
 
 def _show(run: RunFolder, console: Console) -> None:
     entries = read_entries(run.journal)
     if not entries:
         raise UsageError("nothing happened in this run", subject=run.path, action="Name another")
-    console.show(documents.story_document(entries), story_text(entries))
+    told = [
+        {"line": entry.number, "at": entry.at, "kind": entry.event.kind, "text": text}
+        for entry, text in run_story(entries)
+    ]
+    console.show({"events": told}, story_text(entries))
+
+
+def _comparison_document(before: RunFolder, after: RunFolder, compared: RunComparison) -> dict[str, Any]:
+    return {
+        "before": before.path,
+        "after": after.path,
+        "frame": compared.frame,
+        "changed": compared.is_changed,
+        "chi2": compared.test.chi2,
+        "dof": compared.test.expected,
+        "probability": compared.test.probability,
+        "parameters": [
+            {**asdict(one), "change": one.change, "significant": one.is_significant}
+            for one in compared.parameters
+        ],
+    }
+
+
+def _drift_document(found: Sequence[ParameterTrend], watched: DriftHistory) -> dict[str, Any]:
+    return {
+        "parameters": [{**asdict(one), "walking": one.is_walking} for one in found],
+        "runs": watched.runs,
+        "temperatures_c": watched.celsius,
+        "changes": [_change_document(one) for one in watched.changes],
+        "shares_of_limit": dict(watched.shares),
+    }
+
+
+def _change_document(found: FoundChange) -> dict[str, Any]:
+    parameter = {"parameter": found.parameter.name, "unit": found.parameter.kind.unit}
+    return asdict(found) | {"leg": found.leg, **parameter}
+
+
+def _write_document(write: ConfigWrite) -> dict[str, Any]:
+    one = write.record
+    known = one.model_dump(exclude={"version", "files", "why"})
+    return {
+        **{name: None if value == "" else value for name, value in known.items()},
+        "config": one.files[0],
+        "further_configs": one.files[1:],
+        "verdict": write.verdict,
+        "why": write.why or None,
+        "recorded": write.is_recorded,
+    }

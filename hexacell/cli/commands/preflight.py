@@ -2,6 +2,8 @@
 
 import argparse
 import asyncio
+from dataclasses import asdict
+from typing import Any
 
 from drivers.errors import BusError, ConnectionLost, GaugeSilent, PortLost, SilentNodeError, WrongAnswer
 from hexacell.cli.commands.cell import cell_with_devices_at
@@ -10,7 +12,6 @@ from hexacell.dry_run.campaign import try_quick_level
 from hexacell.errors import ExitCode, HexacellError, flatten_errors
 from hexacell.services.offline import try_plan
 from hexacell.services.run.calibration_run import new_calibration, preflight
-from hexacell.text.documents import preflight_document, quick_preflight_document
 from hexacell.text.layout import wrapped
 from hexacell.text.planning import plan_trial_lines, preflight_lines, quick_trial_text
 from hexacell.text.screens.live import exclusions_text
@@ -37,12 +38,21 @@ def main(options: argparse.Namespace, console: Console) -> ExitCode:
         console.print(wrapped(line, indent=6))
     if excluded := exclusions_text(cell.settings):
         console.print(wrapped(excluded))
+    expected: dict[str, Any]
     if mode is Mode.QUICK:
         tried = try_quick_level(new_calibration(cell, mode).at_start.quick)
-        console.show(quick_preflight_document(devices, tried), wrapped(quick_trial_text(tried)))
+        expected = {"points": tried.points, "minutes": tried.minutes, "quick": tried.accuracy}
+        document = {"ready": True, "devices": devices, "expected": expected}
+        console.show(document, wrapped(quick_trial_text(tried)))
         return ExitCode.DONE
     trial = try_plan(cell)
-    console.document(preflight_document(devices, trial))
+    expected = {
+        **asdict(trial.result),
+        "averaging": trial.averaging,
+        "encoders_part_mm": trial.encoders_part_mm,
+        "lost": trial.unreachable,
+    }
+    console.document({"ready": True, "devices": devices, "expected": expected})
     for line in plan_trial_lines(trial):
         console.print(wrapped(line))
     return ExitCode.DONE

@@ -2,6 +2,7 @@
 
 import argparse
 import asyncio
+from dataclasses import asdict
 from pathlib import Path
 
 from hexacell.cli.console import Console
@@ -11,7 +12,6 @@ from hexacell.services.history.run_export import export_run
 from hexacell.services.run.replay_run import replay
 from hexacell.storage.atomic_files import write_atomically
 from hexacell.text import certificate
-from hexacell.text.documents import replay_document
 from hexacell.text.report.pages import Report, html_of, pdf_of
 from hexacell.text.report.report import report_of
 from hexacell.text.run import replay_report
@@ -37,7 +37,22 @@ def replay_run(options: argparse.Namespace, console: Console) -> ExitCode:
     if not 0.0 <= tolerance < float("inf"):
         raise UsageError(f"--tolerance {tolerance:g} is not a tolerance", action="Give a number from 0")
     replayed = asyncio.run(replay(options.run, Scope(options.only or "all"), tolerance))
-    console.show(replay_document(replayed), replay_report(replayed))
+    document = {
+        "same": replayed.is_same,
+        "journal": replayed.journal,
+        "events": replayed.events,
+        "decisions": replayed.decisions,
+        "results": replayed.results,
+        "taken": replayed.taken,
+        "recorded_by": replayed.recorded_by,
+        "replayed_by": replayed.replayed_by,
+        "differences": [
+            {"line": one.line, "place": one.place, "aspect": one.aspect}
+            | {"counts": replayed.counts(one), **asdict(one.change)}
+            for one in replayed.differences
+        ],
+    }
+    console.show(document, replay_report(replayed))
     return ExitCode.DONE if replayed.is_same else ExitCode.OUT_OF_LIMITS
 
 

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
+from typing import Any
 
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
@@ -23,7 +24,6 @@ from hexacell.services.run.demo import prepare_demo
 from hexacell.services.run.event_stream import EventStream
 from hexacell.services.unattended import unattended_runs
 from hexacell.services.unattended.notice import RunEnd
-from hexacell.text.documents import run_document
 from hexacell.text.layout import wrapped
 from hexacell.text.line_face import LETTERS
 from hexacell.text.run import (
@@ -36,11 +36,12 @@ from hexacell.text.run import (
     resume_hint,
 )
 from hexacell.text.screens.live import exclusions_text
+from hexacell.text.verdict import teaching_sentence
 from procedures.calibration.calibration import Mode, expected_records
 from procedures.engine.commands import CommandQueue, UnattendedOperator
 from procedures.engine.engine import Listener
 from procedures.journal.journal import read_journal
-from procedures.run.state import fold
+from procedures.run.state import RunState, fold
 from procedures.run.trips import may_still_move
 from procedures.steps import events
 
@@ -107,6 +108,27 @@ def _run_to_end(request: RunRequest, console: Console, stream: EventStream | Non
     for line in closing_lines(end.request, end.ended):
         console.print(line)
     return ExitCode(end.ended.exit_code)
+
+
+def run_document(request: RunRequest, ended: events.Ended, state: RunState) -> dict[str, Any]:
+    """What ``--json`` prints."""
+    judged, noise, found = state.judged, state.noise, state.identified
+    measurements, moved = request.folder.measurements, ended.displacement
+    return {
+        "exit_code": ended.exit_code,
+        "line": ended.line,
+        "verdict": judged and judged.verdict,
+        "verification": judged and judged.verification,
+        "check": judged and judged.check,
+        "quick": found and found.quick,
+        "length": judged and judged.length,
+        "measured_noise": noise and noise.noise,
+        "displacement": moved,
+        "teaching": moved and teaching_sentence(moved),
+        "run": request.folder.path,
+        "measurements": measurements if measurements.is_file() else None,
+        "config": request.cell.config_path,
+    }
 
 
 def _run_and_repeat(request: RunRequest, console: Console, stream: EventStream | None) -> RunEnd:

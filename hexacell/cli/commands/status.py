@@ -10,7 +10,7 @@ from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, FileError, HexacellError, UsageError
 from hexacell.services.history.cell_status import CellStatus, cell_status, fleet_cells, publish_status
 from hexacell.storage.atomic_files import write_atomically
-from hexacell.text.cells import fleet_document, fleet_text, metrics_text, status_document, status_text
+from hexacell.text.cells import fleet_text, metrics_text, status_document, status_text
 
 
 def main(options: argparse.Namespace, console: Console) -> ExitCode:
@@ -27,7 +27,9 @@ def main(options: argparse.Namespace, console: Console) -> ExitCode:
             console.warn(" ".join(str(error).split()))
     if options.metrics is not None:
         write_atomically(options.metrics, metrics_text(found).encode(), for_everybody=True)
-    console.show(status_document(found, unreadable), status_text(found, unreadable))
+    broken = [{"cell": path, "error": str(error)} for path, error in unreadable.items()]
+    document = {"cells": [status_document(one) for one in found], "unreadable": broken}
+    console.show(document, status_text(found, unreadable))
     return ExitCode.USAGE if unreadable else ExitCode.DONE
 
 
@@ -53,5 +55,6 @@ def _fleet(options: argparse.Namespace, console: Console) -> ExitCode:
     if options.metrics is not None:
         raise UsageError("metrics are of cells of this computer", action="Name their cell files")
     found = fleet_cells(archive_url(options.archive))
-    console.show(fleet_document(found), fleet_text(found))
+    cells = [one.model_dump(mode="json") | {"overdue": one.is_overdue} for one in found]
+    console.show({"cells": cells}, fleet_text(found))
     return ExitCode.DONE

@@ -3,6 +3,7 @@
 import argparse
 import asyncio
 from collections.abc import Callable
+from typing import Any
 
 from hexacell.cell.loader import Cell
 from hexacell.cli.commands.cell import cell_at
@@ -15,6 +16,7 @@ from hexacell.services.unattended.notice import RunEnd, notice_of_end, notice_of
 from hexacell.services.unattended.outbox import notify_all, notify_test, send_waiting, waiting_notices
 from hexacell.services.unattended.scheduled_run import crontab_line
 from hexacell.services.unattended.schedules import (
+    Schedule,
     present_schedule,
     remove_schedule,
     scheduled_run,
@@ -22,7 +24,6 @@ from hexacell.services.unattended.schedules import (
 )
 from hexacell.services.unattended.unattended_runs import local_now, refuse_quiet_hours, refused_start
 from hexacell.text import operation
-from hexacell.text.documents import schedule_document
 from hexacell.text.layout import duration
 from procedures.steps import events
 
@@ -101,7 +102,7 @@ def schedule(options: argparse.Namespace, console: Console) -> ExitCode:
     if options.show or options.remove:
         found = (present_schedule if options.show else remove_schedule)(cell, options.folder)
         console.show(
-            schedule_document(found),
+            _schedule_document(found),
             (operation.present_schedule_text if options.show else operation.removed_schedule_text)(found),
         )
     elif options.daily is None:
@@ -121,7 +122,15 @@ def _write(cell: Cell, options: argparse.Namespace, console: Console) -> None:
         console.show({"crontab": line}, operation.crontab_text(line, stated))
         return
     written = write_schedule(run, options.folder)
-    console.show(schedule_document(written), operation.written_schedule_text(written, run, stated))
+    console.show(_schedule_document(written), operation.written_schedule_text(written, run, stated))
+
+
+def _schedule_document(schedule: Schedule | None) -> dict[str, Any]:
+    return {
+        "unit": schedule and schedule.unit,
+        "files": schedule.files if schedule else [],
+        "complaints": schedule.complaints if schedule else [],
+    }
 
 
 def notify(options: argparse.Namespace, console: Console) -> ExitCode:
@@ -130,7 +139,7 @@ def notify(options: argparse.Namespace, console: Console) -> ExitCode:
     if not (options.test or options.send):
         settings, waiting = cell.settings.notifications, waiting_notices(cell)
         console.show(
-            operation.notifications_document(settings, waiting),
+            {"notifications": [{"name": one.name, "on": one.on} for one in settings], "waiting": waiting},
             operation.notifications_text(settings, waiting),
         )
         return ExitCode.DONE
@@ -138,5 +147,9 @@ def notify(options: argparse.Namespace, console: Console) -> ExitCode:
         action = "Write [[notifications]]"
         raise UsageError("nobody is notified of its runs", subject=cell.path, action=action)
     outcome = notify_test(cell, notice_of_test(cell)) if options.test else send_waiting(cell)
-    console.show(operation.notify_document(outcome), operation.notify_text(outcome))
+    recipients = [
+        {"name": one.name, "told": one.sent, "wait": one.wait, "problem": one.problem}
+        for one in outcome.deliveries
+    ]
+    console.show({"told": recipients, "dropped": outcome.dropped}, operation.notify_text(outcome))
     return ExitCode.DONE if outcome.are_all_sent else ExitCode.HARDWARE

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from datetime import datetime
-from typing import TYPE_CHECKING, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
@@ -77,6 +77,26 @@ class RunSummary(Frozen):
     def position(self) -> JudgedError | None:
         """The largest position error at the task poses, mm; None without one."""
         return None if self.accuracy is None else self.accuracy.position
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """What it was and found, as ``history --json`` prints it."""
+        position = self.position
+        return {
+            "began": self.began,
+            "ended": self.ended,
+            "mode": self.mode or None,
+            "records": self.records,
+            "verdict": self.verdict,
+            "position_mm": position and position.value,
+            "expanded_mm": position and position.expanded,
+            "limit_mm": position and position.limit,
+            "line": self.line,
+            "begun": self.has_begun,
+            "over": self.is_over,
+            "written": self.has_written,
+            "proposal": self.has_proposal,
+        }
 
 
 @dataclass(frozen=True, slots=True)

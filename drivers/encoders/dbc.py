@@ -17,9 +17,8 @@ import can
 
 from drivers.encoders.bank import BankSession, ThreadedBank, bus_settings
 from drivers.encoders.can_bus import EncoderBus
-from drivers.errors import InvalidSampleError, SilentNodeError
+from drivers.errors import InvalidSampleError, SilentNodeError, optional
 from drivers.interfaces import DeviceIdentity
-from drivers.libraries import optional
 from drivers.wire_trace import TraceRecorder
 from hexacell.cell.described_devices import DbcSettings
 from hexacell.cell.devices import EncoderSettings

@@ -11,7 +11,7 @@ from contextlib import suppress
 from functools import partial
 from typing import Any
 
-from drivers.errors import PortLost, WrongSetting
+from drivers.errors import PortLost, WrongSetting, optional
 from drivers.gauges.protocol import (
     DisplayedValue,
     FrameRejected,
@@ -22,7 +22,6 @@ from drivers.gauges.protocol import (
     decimals_of,
 )
 from drivers.gauges.serial_gauge import SerialGauge
-from drivers.libraries import optional
 from drivers.serial.opening import lost_port
 from drivers.serial.port import SerialPort
 from drivers.serial.request_port import NoAnswer, RequestPort

@@ -15,7 +15,7 @@ from typing import Any
 
 import serial
 
-from drivers.libraries import optional
+from drivers.errors import optional
 from drivers.serial.opening import SLICE_S, lost_port, opened_port
 from drivers.serial.request_port import NoAnswer, RequestPort, is_copies
 from drivers.wire_trace import TrafficDirection

@@ -13,8 +13,14 @@ from math import inf
 
 import serial
 
-from drivers.serial.opening import SLICE_S, close_port, lost_port, opened_port
-from drivers.serial.parity import have_terminal_check, in_software
+from drivers.serial.opening import (
+    SLICE_S,
+    close_port,
+    have_terminal_check,
+    in_software,
+    lost_port,
+    opened_port,
+)
 from drivers.serial.request_port import (
     FRAME_LIMIT,
     LINE_ENDS,

@@ -49,7 +49,11 @@ def with_longer_legs(
 
 
 class _Statics:
-    """The legs of a controller's geometry at n poses within reach."""
+    """The legs of a controller's geometry at n poses within reach.
+
+    Forces follow from virtual work: while the platform moves a little with the joints held, the forces of
+    the legs do the work of the weight.
+    """
 
     def __init__(self, mechanism: Mechanism, controller: ControllerGeometry, poses: PoseBatch) -> None:
         self._mechanism = mechanism

@@ -1,5 +1,6 @@
 """Versions of a controller's config, number by number: before a run, as written, and edited since."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -68,34 +69,35 @@ def compare_versions(
     now = read_contents(paths)
     edits = [diff_of_files(paths, version, now) for _, version in (before, written)]
     is_from_written = len(edits[1]) <= len(edits[0])
-    old, new = (numbers_of(version, layout) for version, _ in (before, written))
     current = config_if_readable(paths, layout)
-    last = None if current is None else numbers_of(current, layout)
-    units = {name: unit for every in (old, new, last or {}) for name, (unit, _) in every.items()}
-    found = (
-        NumberVersions(
-            name,
-            unit,
-            old.get(name, (unit, 0.0))[1],
-            new.get(name, (unit, 0.0))[1],
-            None if last is None else last.get(name, (unit, 0.0))[1],
-        )
-        for name, unit in units.items()
+    readable = [before[0], written[0], *([] if current is None else [current])]
+    numbers = tuple(
+        NumberVersions(name, unit, values[0], values[1], values[2] if current is not None else None)
+        for name, unit, values in numbers_of(readable, layout)
+        if len(set(values)) > 1 or current is None
     )
-    numbers = tuple(one for one in found if len({one.before, one.written, one.now}) > 1)
     return ConfigVersions(numbers, edits[is_from_written], is_from_written)
 
 
-def numbers_of(config: ControllerGeometry, layout: ConfigLayout) -> dict[str, tuple[str, float]]:
-    """Unit and value of each number of a config, by its name: the geometry's, then the corrections'."""
-    geometry = config.geometry
-    found = {
-        one.name: (str(one.kind.unit), value)
-        for one, value in zip(geometry.parameters.parameters, geometry.vector.tolist(), strict=True)
-    }
-    return found | {
-        name: (unit, value) for name, unit, value in config.corrections.numbers(layout.joint_unit)
-    }
+def numbers_of(
+    configs: Sequence[ControllerGeometry], layout: ConfigLayout
+) -> Iterator[tuple[str, str, list[float]]]:
+    """Name and unit of each number of the geometry and the corrections, with its values in some configs.
+
+    A number that a config does not have is zero there.
+    """
+    units: dict[str, str] = {}
+    found: list[dict[str, float]] = []
+    for config in configs:
+        parameters, geometry = config.geometry.parameters.parameters, config.geometry.vector.tolist()
+        numbers = [
+            (one.name, str(one.kind.unit), value) for one, value in zip(parameters, geometry, strict=True)
+        ]
+        numbers += config.corrections.numbers(layout.joint_unit)
+        units |= {name: unit for name, unit, _ in numbers}
+        found.append({name: value for name, _, value in numbers})
+    for name, unit in units.items():
+        yield name, unit, [one.get(name, 0.0) for one in found]
 
 
 def config_if_readable(paths: tuple[Path, ...], layout: ConfigLayout) -> ControllerGeometry | None:

@@ -193,17 +193,12 @@ def _changes(
 ) -> list[NumberChange] | None:
     if before is None or after is None:
         return None
-    old, new = numbers_of(before, layout), numbers_of(after, layout)
-    found = [
-        NumberChange(
-            name=name, change=new.get(name, (unit, 0.0))[1] - old.get(name, (unit, 0.0))[1], unit=unit
-        )
-        for name, (unit, _) in (old | new).items()
+    changes = [
+        NumberChange(name=name, change=new - old, unit=unit)
+        for name, unit, (old, new) in numbers_of([before, after], layout)
+        if new != old
     ]
-    return sorted(
-        (one for one in found if one.change),
-        key=lambda one: -abs(one.change) / _LIKE_A_MM.get(one.unit, np.inf),
-    )
+    return sorted(changes, key=lambda one: -abs(one.change) / _LIKE_A_MM.get(one.unit, np.inf))
 
 
 # A link would lead what is appended to another file; a pipe would be waited for.

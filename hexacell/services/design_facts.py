@@ -14,6 +14,7 @@ from typing import cast
 
 import numpy as np
 
+from hexacell.campaign.feasibility import broken_limits
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
@@ -29,7 +30,6 @@ from hexacell.kinematics.rotations import Array, Mask, from_angles
 from hexacell.kinematics.sensitivity import has_singularity_margin, singularity_margin
 from hexacell.lengths import MM_PER_METRE
 from hexacell.robot.model import Robot, make_robot, robot_of
-from hexacell.robot.pose_limits import broken_limits
 from hexacell.robot.same_robot import reordered
 from hexacell.services.other_units import (
     MOST,

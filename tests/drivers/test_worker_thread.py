@@ -9,8 +9,7 @@ import pytest
 import serial
 from canopen import SdoCommunicationError
 
-from drivers.errors import GaugeSilent
-from drivers.libraries import translated
+from drivers.errors import GaugeSilent, translated
 from drivers.worker_thread import WorkerThread
 from hexacell.errors import DeviceError
 

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hexacell.campaign.feasibility import broken_limits
 from hexacell.cell.loader import load_cell
 from hexacell.config.interface import ControllerGeometry
 from hexacell.kinematics.pose import Pose
 from hexacell.robot.model import make_robot, robot_of
-from hexacell.robot.pose_limits import broken_limits
 from tests.geometries import hexaglide_geometry
 
 CELL = Path(__file__).parents[2] / "configs" / "simulated-hexaglide.toml"

@@ -5,8 +5,8 @@ from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from drivers.errors import translated
 from drivers.interfaces import DeviceIdentity
-from drivers.libraries import translated
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.stop_input import stop_input_of
 from drivers.wire_trace import WireTrace

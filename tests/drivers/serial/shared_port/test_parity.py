@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from drivers.errors import WrongAnswer
 from drivers.gauges.protocol import FrameRejected
 from drivers.gauges.sylvac import SylvacGauge
-from drivers.serial.parity import DAMAGED, ParityInBit7, in_software
+from drivers.serial.opening import DAMAGED, ParityInBit7, in_software
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import FileError

@@ -15,9 +15,10 @@ from typing import Any, TextIO, TypeVar
 from hexacell.cli.console import Console
 from hexacell.cli.process import STOP_SIGNALS, handled
 from hexacell.errors import AnswerNeeded, Interruption
+from hexacell.text.layout import wrapped
 from hexacell.text.line_face import LETTERS
-from hexacell.text.run import question_text
 from hexacell.text.screens.questions import question_view
+from hexacell.text.screens.views import QuestionView
 from procedures.engine.commands import Abort, Command, CommandQueue, MeasureAgain, Pause, Resume, Stop, Undo
 from procedures.run.keys import SetKey
 from procedures.run.questions import Question
@@ -218,3 +219,14 @@ async def _line(terminal: TextIO) -> str:
     finally:
         loop.remove_reader(terminal)
     return terminal.readline()
+
+
+def question_text(view: QuestionView) -> str:
+    """The question for a terminal that reads one line as the answer, as the screen asks it.
+
+    The change of a config comes first: what decides about it is then in sight beside the question.
+    """
+    about = [text if "\n" in text else wrapped(text, indent=4) for text in view.paragraphs]
+    if view.title.endswith("?"):
+        return "\n".join(["", *filter(None, [view.change]), *about, f"{view.title}\n{view.request}"])
+    return "\n".join(["", view.title, *about, view.request])

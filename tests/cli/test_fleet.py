@@ -3,9 +3,9 @@
 import socket
 from datetime import UTC, datetime, timedelta
 
+from hexacell.cli.commands.status import fleet_text
 from hexacell.runs.cell_lock import cell_lock
 from hexacell.services.history.cell_status import FleetCell
-from hexacell.text.cells import fleet_text
 
 
 def share(cell, url: str, name: str) -> None:

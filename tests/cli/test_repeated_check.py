@@ -7,9 +7,9 @@ import pytest
 
 from hexacell.checks.change_alarm import ChangeAlarm
 from hexacell.checks.check_result import CheckResult
+from hexacell.cli.commands.run import NOT_REPEATED_ALARM, REPEATED, REPEATED_ALARM
 from hexacell.errors import ExitCode
 from hexacell.services.run.calibration_run import RunRequest
-from hexacell.text.run import NOT_REPEATED_ALARM, REPEATED, REPEATED_ALARM
 from hexacell.verdict.decision import Verdict
 from procedures.journal.journal import Journal
 from procedures.steps import events

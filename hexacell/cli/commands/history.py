@@ -7,6 +7,7 @@ from typing import Any
 
 from hexacell.cell.loader import Cell
 from hexacell.cli.commands.cell import archive_url, cell_at
+from hexacell.cli.commands.status import fleet_history_text
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
 from hexacell.results.run_comparison import ParameterTrend, RunComparison
@@ -22,7 +23,6 @@ from hexacell.services.history.past_runs import (
 )
 from hexacell.services.history.run_index import RunIndex
 from hexacell.services.write_back.config_history import ConfigWrite, config_history
-from hexacell.text.cells import fleet_history_text
 from hexacell.text.config_changes import config_history_text
 from hexacell.text.history import comparison_text, drift_text, history_text, retention_text, watch_text
 from hexacell.text.line_face import run_story, story_text

@@ -12,16 +12,19 @@ from hexacell.services.history.run_export import export_run
 from hexacell.services.run.replay_run import replay
 from hexacell.storage.atomic_files import write_atomically
 from hexacell.text import certificate
+from hexacell.text.layout import wrapped
 from hexacell.text.report.pages import Report, html_of, pdf_of
 from hexacell.text.report.report import report_of
-from hexacell.text.run import replay_report
 from procedures.replay.recorded_executor import TOLERANCE
-from procedures.replay.replayer import Scope
+from procedures.replay.replayer import Aspect, ReplayReport, Scope
 
 CERTIFICATE = ".xml"
 """How the name of a file ends that is to be one."""
 
 KINDS = (".html", ".htm", ".pdf", CERTIFICATE)
+
+LISTED_DIFFERENCES = 10
+"""How many differences of a replay are printed."""
 
 
 def replay_run(options: argparse.Namespace, console: Console) -> ExitCode:
@@ -52,7 +55,7 @@ def replay_run(options: argparse.Namespace, console: Console) -> ExitCode:
             for one in replayed.differences
         ],
     }
-    console.show(document, replay_report(replayed))
+    console.show(document, _replay_report(replayed))
     return ExitCode.DONE if replayed.is_same else ExitCode.OUT_OF_LIMITS
 
 
@@ -89,3 +92,24 @@ def _written(suffix: str, run: ReportedRun, made: Report) -> bytes:
             return certificate.certificate_of_run(run)
         case _:
             return html_of(made).encode()
+
+
+def _replay_report(replayed: ReplayReport) -> str:
+    """The differences, those that count first, and the verdict."""
+    found = sorted(replayed.differences, key=lambda one: not replayed.counts(one))
+    lines = [
+        wrapped(f"{'NO' if replayed.counts(one) else '--'}  {one}", indent=4)
+        for one in found[:LISTED_DIFFERENCES]
+    ]
+    if len(found) > LISTED_DIFFERENCES:
+        lines.append(f"and {len(found) - LISTED_DIFFERENCES} more (--json lists them)")
+    if any(one.aspect is Aspect.DECISION for one in found) and not replayed.is_same_software:
+        lines.append(
+            wrapped(f"{replayed.recorded_by} recorded it: {replayed.replayed_by} may decide otherwise.")
+        )
+    outcome = "the same as recorded"
+    if not replayed.is_same:
+        first = next(one for one in replayed.differences if replayed.counts(one))
+        outcome = f"different, first in line {first.line} ({first.place})"
+    what = f"{replayed.decisions} decisions and {replayed.results} results of {replayed.events} events"
+    return "\n".join([*lines, f"{what}: {outcome}"])

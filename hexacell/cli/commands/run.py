@@ -1,10 +1,12 @@
 """``hexacell run`` and ``hexacell demo``: the whole job, with progress, signals, keys and its outcome."""
 
 import argparse
+import shlex
 import sys
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from hexacell.campaign.pose_list import pose_list_of
@@ -26,17 +28,8 @@ from hexacell.services.unattended import unattended_runs
 from hexacell.services.unattended.notice import RunEnd
 from hexacell.text.layout import wrapped
 from hexacell.text.line_face import LETTERS
-from hexacell.text.run import (
-    NOT_REPEATED_ALARM,
-    REPEATED,
-    REPEATED_ALARM,
-    UNVERIFIED,
-    closing_lines,
-    demo_opening,
-    resume_hint,
-)
 from hexacell.text.screens.live import exclusions_text
-from hexacell.text.verdict import teaching_sentence
+from hexacell.text.verdict import teaching_line, teaching_sentence
 from procedures.calibration.calibration import Mode, expected_records
 from procedures.engine.commands import CommandQueue, UnattendedOperator
 from procedures.engine.engine import Listener
@@ -44,6 +37,15 @@ from procedures.journal.journal import read_journal
 from procedures.run.state import RunState, fold
 from procedures.run.trips import may_still_move
 from procedures.steps import events
+
+REPEATED = "The check raised an alarm, which one unchanged machine in 100 does: it is made once more."
+REPEATED_ALARM = "The alarm was raised again: the machine has changed."
+NOT_REPEATED_ALARM = "The alarm was not raised again."
+
+UNVERIFIED = (
+    "The controller's config holds the new geometry, which is not verified yet: resuming "
+    "verifies it, or restores the old one."
+)
 
 
 def main(options: argparse.Namespace, console: Console) -> ExitCode:
@@ -199,3 +201,32 @@ async def _calibrate(
         listeners: list[Listener] = [*further, progress, keys, watching.note]
         run = calibrate(request, listeners, queue, watching.live, watching.follow)
         return await keys.listen_during(run)
+
+
+def demo_opening(machine: str, config: Path) -> str:
+    """What the demo is about to calibrate: the kind of machine, and its controller's config."""
+    devices = "gauges on serial lines, encoders on CAN, TCP controller."
+    return (
+        f"{wrapped(f'A simulated {machine}: {devices}')}\n"
+        "The geometry in its controller's config is wrong by millimetres:\n"
+        f"  {config}"
+    )
+
+
+def resume_hint(request: RunRequest) -> str:
+    """How to resume a run that was stopped."""
+    return f"Stopped; what was measured is kept. To continue:\n  {resume_command(request)}"
+
+
+def resume_command(request: RunRequest) -> str:
+    """The shell command that resumes a run with a person at the terminal."""
+    command = "length" if request.mode is Mode.LENGTH else "run"
+    mode = ["--mode", request.mode.value] if request.mode in {Mode.CHECK, Mode.QUICK} else []
+    words = ["hexacell", command, str(request.cell.path), "--resume", str(request.folder.path), *mode]
+    return shlex.join(words)
+
+
+def closing_lines(request: RunRequest, ended: events.Ended) -> tuple[str, ...]:
+    """The run folder, what must be taught anew, and last the result in one line."""
+    teaching = () if ended.displacement is None else (teaching_line(ended.displacement),)
+    return (f"Everything about this run is in {request.folder.path}", *teaching, ended.line)

@@ -1,16 +1,53 @@
-"""``hexacell status``: cells at a glance, and their metrics for a monitoring system."""
+"""``hexacell status``: cells at a glance, of this computer or of all that share an archive, and metrics.
+
+The metrics are in the text format of Prometheus, for the textfile collector of its node exporter.
+"""
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from textwrap import indent
+from typing import Any
 
 from hexacell.cell.loader import is_cell_file
 from hexacell.cli.commands.cell import archive_url, cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, FileError, HexacellError, UsageError
-from hexacell.services.history.cell_status import CellStatus, cell_status, fleet_cells, publish_status
+from hexacell.services.history.cell_status import (
+    CellStatus,
+    FleetCell,
+    FleetRun,
+    cell_status,
+    fleet_cells,
+    publish_status,
+    summary_of,
+)
 from hexacell.storage.atomic_files import write_atomically
-from hexacell.text.cells import fleet_text, metrics_text, status_document, status_text
+from hexacell.text.history import legs_text
+from hexacell.text.layout import error_with_u, figure_with_u, minute, verdict_word
+from hexacell.verdict.decision import Verdict
+
+LONGEST_NAME = 22
+NO_CELLS = "No cell has put anything into this archive: hexacell status CELL does, and each run."
+NO_FLEET_RUNS = "There are no runs in this archive."
+
+HELP = {
+    "hexacell_in_use": "Whether a process holds the cell.",
+    "hexacell_last_run_timestamp_seconds": "When the latest run ended.",
+    "hexacell_last_run_begun": "Whether the latest run began; one that was refused each time did not.",
+    "hexacell_last_run_passed": "Whether the latest run with a verdict passed.",
+    "hexacell_last_verdict": "1 for the verdict of the latest run that has one.",
+    "hexacell_last_pass_timestamp_seconds": "When a run passed last.",
+    "hexacell_calibration_timestamp_seconds": "When the run ended whose config the controller has.",
+    "hexacell_calibration_due_timestamp_seconds": "When the next calibration is due.",
+    "hexacell_position_error_mm": "Largest position error at the task poses, by the latest verdict.",
+    "hexacell_position_expanded_mm": "Its expanded uncertainty (k = 2).",
+    "hexacell_position_limit_mm": "Its limit.",
+    "hexacell_open_proposal": "Whether a proposal waits for a person.",
+    "hexacell_changes_found": "Changes of the robot that the watch over all runs found.",
+    "hexacell_largest_sum_ratio": "Largest cumulative sum of a parameter, over the limit of an alarm.",
+}
+ESCAPES = str.maketrans({"\\": "\\\\", '"': '\\"', "\n": "\\n"})
 
 
 def main(options: argparse.Namespace, console: Console) -> ExitCode:
@@ -58,3 +95,129 @@ def _fleet(options: argparse.Namespace, console: Console) -> ExitCode:
     cells = [one.model_dump(mode="json") | {"overdue": one.is_overdue} for one in found]
     console.show({"cells": cells}, fleet_text(found))
     return ExitCode.DONE
+
+
+def status_text(found: Sequence[CellStatus], unreadable: Mapping[Path, HexacellError]) -> str:
+    """A line a cell, and below it what needs somebody; the broken ones at the end."""
+    head = f"{'cell':{LONGEST_NAME}} {'latest verdict':17} {'error, mm':16} {'when':17} in use"
+    lines = [head, *(line for one in found for line in _lines(one))]
+    for path, error in unreadable.items():
+        lines += [f"{path.name[:LONGEST_NAME]:{LONGEST_NAME}} cannot be read", indent(str(error), "  ")]
+    return "\n".join(lines)
+
+
+def metrics_text(found: Sequence[CellStatus]) -> str:
+    """All samples, those of one metric together, each with its help."""
+    samples: dict[str, list[str]] = {name: [] for name in HELP}
+    for one in found:
+        for name, labels, value in _samples(one):
+            named = {"cell": one.cell.settings.name, **labels}
+            shown = ",".join(f'{label}="{text.translate(ESCAPES)}"' for label, text in named.items())
+            samples[name].append(f"{name}{{{shown}}} {value}")
+    return "".join(
+        f"# HELP {name} {HELP[name]}\n# TYPE {name} gauge\n" + "".join(f"{line}\n" for line in lines)
+        for name, lines in samples.items()
+        if lines
+    )
+
+
+def _lines(one: CellStatus) -> Iterator[str]:
+    judged, latest = summary_of(one.judged), one.latest
+    verdict, error = verdict_word(judged.verdict), error_with_u(judged.accuracy)
+    when, used = minute(judged.ended), "no" if one.in_use_by is None else f"by {one.in_use_by}"
+    yield f"{one.cell.settings.name[:LONGEST_NAME]:{LONGEST_NAME}} {verdict:17} {error:16} {when:17} {used}"
+    if one.proposal is not None:
+        yield f"  a proposal waits for a person: hexacell apply {one.proposal.folder.path}"
+    if latest is not None and not (latest.summary.has_begun and latest.summary.is_over):
+        yield f"  {latest.name}: {latest.summary.line}"
+    if one.ends_in_future is not None:
+        yield f"  {one.ends_in_future.name} ended in the future: this computer's clock is wrong, or was"
+    if one.due_at is not None:
+        yield f"  calibration due on {one.due_at:%Y-%m-%d}"
+    if one.drift.changes:
+        last = one.drift.changes[-1]
+        noticed = f"noticed on {last.noticed:%Y-%m-%d}"
+        yield f"  leg {legs_text(last)} changed, {noticed}; hexacell history --drift shows more"
+
+
+def status_document(one: CellStatus) -> dict[str, Any]:
+    """What ``status --json`` prints of a cell."""
+    judged, worst = summary_of(one.judged), one.worst_share
+    position = judged.position
+    return {
+        "cell": one.cell.path,
+        "name": one.cell.settings.name,
+        "in_use_by": one.in_use_by,
+        "verdict": judged.verdict,
+        "position_mm": position and position.value,
+        "expanded_mm": position and position.expanded,
+        "judged_at": judged.ended,
+        "passed_at": one.passed_at,
+        "in_force": one.in_force and one.in_force.folder.path,
+        "due_at": one.due_at,
+        "proposal": one.proposal and one.proposal.folder.path,
+        "not_begun": one.latest.summary.line if one.latest and not one.latest.summary.has_begun else None,
+        "changes": len(one.drift.changes),
+        "largest_sum": worst and {"parameter": worst[0], "ratio": worst[1]},
+    }
+
+
+def _samples(one: CellStatus) -> Iterator[tuple[str, dict[str, str], str]]:
+    yield "hexacell_in_use", {}, str(int(one.in_use_by is not None))
+    yield "hexacell_open_proposal", {}, str(int(one.proposal is not None))
+    yield "hexacell_changes_found", {}, str(len(one.drift.changes))
+    if one.latest is not None:
+        yield "hexacell_last_run_begun", {}, str(int(one.latest.summary.has_begun))
+    times = {
+        "hexacell_last_run_timestamp_seconds": summary_of(one.latest).ended,
+        "hexacell_last_pass_timestamp_seconds": one.passed_at,
+        "hexacell_calibration_timestamp_seconds": summary_of(one.in_force).ended,
+        "hexacell_calibration_due_timestamp_seconds": one.due_at,
+    }
+    yield from ((name, {}, repr(at.timestamp())) for name, at in times.items() if at is not None)
+    if (worst := one.worst_share) is not None:
+        yield "hexacell_largest_sum_ratio", {"parameter": worst[0]}, repr(worst[1])
+    if one.judged is None:
+        return
+    verdict, position = one.judged.summary.verdict, one.judged.summary.position
+    yield "hexacell_last_run_passed", {}, str(int(verdict is Verdict.PASS))
+    for each in Verdict:
+        yield "hexacell_last_verdict", {"verdict": each.value}, str(int(each is verdict))
+    if position is not None:
+        yield "hexacell_position_error_mm", {}, repr(position.value)
+        yield "hexacell_position_expanded_mm", {}, repr(position.expanded)
+        yield "hexacell_position_limit_mm", {}, repr(position.limit)
+
+
+def fleet_text(cells: Sequence[FleetCell]) -> str:
+    """A line a cell of an archive, of at most 80 columns, and below it what needs somebody."""
+    if not cells:
+        return NO_CELLS
+    head = _fleet_columns("cell", "host", "latest verdict", "error, mm", "last run")
+    return "\n".join([head, *(line for one in cells for line in _fleet_cell_lines(one))])
+
+
+def _fleet_cell_lines(one: FleetCell) -> Iterator[str]:
+    error = figure_with_u(one.position_mm, one.expanded_mm)
+    yield _fleet_columns(one.name, one.host, verdict_word(one.verdict), error, minute(one.latest_at))
+    if one.due_at is not None:
+        yield f"  calibration {'OVERDUE since' if one.is_overdue else 'due on'} {one.due_at:%Y-%m-%d}"
+    if one.proposal is not None:
+        yield f"  a proposal waits for a person: {one.proposal}, on {one.host}"
+    if one.changes:
+        yield "  the robot has changed; hexacell history --drift on its computer shows more"
+
+
+def fleet_history_text(runs: Sequence[FleetRun]) -> str:
+    """A line a run of an archive."""
+    if not runs:
+        return NO_FLEET_RUNS
+    lines = [_fleet_columns("cell", "host", "verdict", "error, mm", "ended")]
+    for one in runs:
+        verdict, error = verdict_word(one.summary.verdict), error_with_u(one.summary.accuracy)
+        lines.append(_fleet_columns(one.cell, one.host, verdict, error, minute(one.summary.ended)))
+    return "\n".join(lines)
+
+
+def _fleet_columns(cell: str, host: str, verdict: str, error: str, when: str) -> str:
+    return f"{cell[:18]:18} {host[:11]:11} {verdict:16} {error:15} {when}".rstrip()

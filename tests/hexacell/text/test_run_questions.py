@@ -2,9 +2,9 @@
 
 from drivers.interfaces import StartupAction
 from hexacell.cell.recovery import Action
+from hexacell.cli.terminal import question_text
 from hexacell.kinematics.pose import Pose
 from hexacell.results.written_geometry import TaskDisplacement
-from hexacell.text.run import question_text
 from hexacell.text.screens.questions import question_view
 from hexacell.text.verdict import teaching_sentence
 from hexacell.verdict.acceptance_gates import AcceptanceGate

@@ -12,13 +12,12 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.cli.arguments import make_parser
-from hexacell.cli.commands.run import run_document
+from hexacell.cli.commands.run import closing_lines, resume_command, resume_hint, run_document
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.run_process.messages import GaugeSnapshot, LiveSnapshot, Shown
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services.run.calibration_run import RunRequest
 from hexacell.text.line_face import EventFormatter, activity, event_text, gauges_text, run_story, story_text
-from hexacell.text.run import closing_lines, resume_command, resume_hint
 from hexacell.text.verdict import teaching_line, teaching_sentence
 from procedures.calibration.calibration import Mode
 from procedures.engine.commands import UnattendedOperator

@@ -44,12 +44,6 @@ def pilots_per_departure(is_listed: bool) -> int:
     return PER_DEPARTURE_TO_A_LIST if is_listed else PER_DEPARTURE
 
 
-def most_pilots(departures: int, is_listed: bool) -> int:
-    """At how many poses in all, if the reference is left so often."""
-    most = MOST_TO_A_LIST if is_listed else MOST_PILOTS
-    return min(most, departures * pilots_per_departure(is_listed))
-
-
 def pilot_number(orientation: int) -> int | None:
     """The number, from 1, of the pilot pose that an orientation means; None for another pose."""
     return orientation - MOST_POSES if orientation >= FIRST_PILOT else None

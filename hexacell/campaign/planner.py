@@ -17,6 +17,8 @@ from hexacell.campaign.budget import Budget, shared_sizes
 from hexacell.campaign.decisions import (
     CAUTION,
     FIRST_PILOT,
+    MOST_PILOTS,
+    MOST_TO_A_LIST,
     CampaignState,
     Decision,
     Finished,
@@ -24,7 +26,6 @@ from hexacell.campaign.decisions import (
     Forecast,
     MeasurePose,
     StartPoint,
-    most_pilots,
     pilots_per_departure,
 )
 from hexacell.campaign.forecast import Forecaster, PlannedInformation, select_sets
@@ -103,7 +104,8 @@ class Plan:
             HexacellError: no geometry fits the records.
         """
         point, is_first = state.point, len(state.measurements) == 1
-        most = most_pilots(self.settings.noise.revisits, self.pose_list is not None)
+        most = MOST_PILOTS if self.pose_list is None else MOST_TO_A_LIST
+        most = min(most, self.settings.noise.revisits * self.pilots_per_departure)
         is_enough = len(state.pilots) >= most or state.rejections > 0
         if point is None or not is_first or is_enough or self.goal is not None:
             return None

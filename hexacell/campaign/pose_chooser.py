@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.campaign.decisions import CampaignState
-from hexacell.campaign.pose_list import PoseList, without_visited
+from hexacell.campaign.pose_list import PoseList
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.design import candidates
@@ -117,7 +117,8 @@ class PoseChooser:
         start = visited[row : row + 1] if len(visited) else zero.command(belief)
         planner = PathPlanner(belief, start, visited[:1] if row else None, zero.reference)
         if self.pose_list is not None:
-            waiting = without_visited(self.pose_list.at(state.point or 0)[1:], _visited(state))
+            done, listed = PoseBatch.of(_visited(state)), self.pose_list.at(state.point or 0)[1:]
+            waiting = [one for one in listed if not done.is_same(PoseBatch.of([one])).any()]
             return select_from_list(planner, zero, self.robot.from_commands(waiting), state.rejections)
         well_known = is_well_known(belief, zero)
         is_blind = len(state.steering) == 1 and not well_known

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from hexacell.cell.loader import Cell
 from hexacell.errors import FileError
-from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.pose import Pose
 from hexacell.measurements.csv_file import read_poses
 
 
@@ -70,9 +70,3 @@ def pose_list_of(cell: Cell) -> PoseList | None:
             )
     kept = (tuple(pose for pose in poses if excluded.allows(pose.as_tuple())) for poses in at_points)
     return PoseList(path, tuple(kept))
-
-
-def without_visited(poses: tuple[Pose, ...], visited: list[Pose]) -> tuple[Pose, ...]:
-    """The poses that were not visited yet."""
-    done = PoseBatch.of(visited)
-    return tuple(pose for pose in poses if not done.is_same(PoseBatch.of([pose])).any())

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hexacell.campaign.decisions import Forecast
@@ -16,7 +17,7 @@ from hexacell.text.layout import COLUMNS, duration, wrapped
 from hexacell.text.measured_noise import measured_noise_text, reversal_sentence
 from hexacell.text.planning import quick_accuracy_sentences, run_forecast_line
 from hexacell.text.terms import run_terms_text
-from hexacell.text.verdict import check_text, length_text, start_text, verification_text
+from hexacell.text.verdict import check_text, length_text, verification_text
 from procedures.journal.journal import Entry
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, apply
@@ -126,7 +127,11 @@ def _whole_text(event: events.Event, state: RunState) -> str | None:
     match event:
         case events.RunStarted(mode=mode, accepted=accepted):
             what = "quick level" if mode == "quick" else "check"
-            return None if mode == "optimise" else start_text(what, accepted)
+            begun = f"no accepted result has the controller's config: the {what} starts from the drawing"
+            if accepted is not None:
+                name = Path(accepted.run).name
+                begun = f"the {what} starts from the result of {accepted.at:%Y-%m-%d}, {name}"
+            return None if mode == "optimise" else begun
         case events.NoiseMeasured():
             noise = measured_noise_text(event.noise, with_averaging=True)
             pilots = len(state.set(event.at).pilots)

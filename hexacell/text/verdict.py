@@ -1,12 +1,11 @@
 """Words for what is decided: verdict, errors with U, evidence, length scale, what must be taught anew."""
 
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 from hexacell.checks.change_alarm import ChangeAlarm
 from hexacell.checks.check_result import CheckResult
 from hexacell.lengths import from_to, unit_of
-from hexacell.results.result import AcceptedResult, ExpectedImprovement, LengthResult
+from hexacell.results.result import ExpectedImprovement, LengthResult
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.text.layout import change_with_sigma
 from hexacell.verdict.acceptance_gates import AcceptanceGate
@@ -102,13 +101,6 @@ def alarm_sentence(alarm: ChangeAlarm) -> str:
         f"{alarm.score:.1f}, by chance {alarm.limit:.1f} in one check of 100). If one part changed, it is "
         f"of leg {alarm.leg}, as by {size} of {alarm.parameter}. Repeat the check: this is no verdict"
     )
-
-
-def start_text(what: str, accepted: AcceptedResult | None) -> str:
-    """What a check or a quick level, which ``what`` names, starts from."""
-    if accepted is None:
-        return f"no accepted result has the controller's config: the {what} starts from the drawing"
-    return f"the {what} starts from the result of {accepted.at:%Y-%m-%d}, {Path(accepted.run).name}"
 
 
 def not_checked(scale_of: str = "encoders") -> str:

@@ -142,7 +142,7 @@ STUDIES = (
         "robots, each measured in every way",
     ),
 )
-"""Name, summary, and what is drawn; each a row of ``hexacell.text.studies``, which takes long to import."""
+"""Name, summary, and what is drawn; each is a row of ``hexacell.cli.commands.study``, slow to import."""
 
 
 def add_study_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private

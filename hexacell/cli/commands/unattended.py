@@ -123,10 +123,7 @@ def schedule(options: argparse.Namespace, console: Console) -> ExitCode:
     cell = cell_at(options.cell, console)
     if options.show or options.remove:
         found = (present_schedule if options.show else remove_schedule)(cell, options.folder)
-        console.show(
-            _schedule_document(found),
-            (present_schedule_text if options.show else removed_schedule_text)(found),
-        )
+        console.show(_schedule_document(found), _schedule_text(found, is_removed=options.remove))
     elif options.daily is None:
         raise UsageError("the time of day is missing", action="Give --daily 02:30, --show or --remove")
     else:
@@ -141,7 +138,9 @@ def _write(cell: Cell, options: argparse.Namespace, console: Console) -> None:
         if options.on_failure is not None:
             raise UsageError("only systemd starts a unit on a failure", action="Leave --on-failure away")
         line = crontab_line(run)
-        console.show({"crontab": line}, crontab_text(line, stated))
+        tries = "the run tries again in its window" if stated.window_minutes else "cron does not try again"
+        text = f"Put this line into `crontab -e`; {tries}, and cron mails what is said:\n{line}"
+        console.show({"crontab": line}, text)
         return
     written = write_schedule(run, options.folder)
     console.show(_schedule_document(written), written_schedule_text(written, run, stated))
@@ -173,7 +172,9 @@ def notify(options: argparse.Namespace, console: Console) -> ExitCode:
         {"name": one.name, "told": one.sent, "wait": one.wait, "problem": one.problem}
         for one in outcome.deliveries
     ]
-    console.show({"told": recipients, "dropped": outcome.dropped}, notify_text(outcome))
+    lines = [f"{one.name}: {one.problem or f'notified ({one.sent})'}" for one in outcome.deliveries]
+    text = "\n".join([*lines, *_dropped(outcome)] or ["nothing waits"])
+    console.show({"told": recipients, "dropped": outcome.dropped}, text)
     return ExitCode.DONE if outcome.are_all_sent else ExitCode.HARDWARE
 
 
@@ -189,12 +190,6 @@ def notify_line(outcome: NotifyOutcome) -> str | None:
         return None
     waits = any(one.wait for one in outcome.deliveries)
     return f"not notified: {'; '.join(problems)}{f' ({NEXT_TIME})' if waits else ''}"
-
-
-def notify_text(outcome: NotifyOutcome) -> str:
-    """A line for each recipient: how many notices it took, or why not."""
-    lines = [f"{one.name}: {one.problem or f'notified ({one.sent})'}" for one in outcome.deliveries]
-    return "\n".join([*lines, *_dropped(outcome)] or ["nothing waits"])
 
 
 def _dropped(outcome: NotifyOutcome) -> list[str]:
@@ -259,26 +254,15 @@ def _ending(run: ScheduledRun, stated: UnattendedSettings) -> str:
     return f"{longest} goes back to its reference and ends; after {stopped}"
 
 
-def present_schedule_text(schedule: Schedule | None) -> str:
-    """The units as they are."""
+def _schedule_text(schedule: Schedule | None, *, is_removed: bool) -> str:
+    """The units as they are, or what was removed, and how that is put in force."""
     if schedule is None:
         return "This cell has no schedule."
-    return "\n".join(f"{path}\n{path.read_text()}" for path in schedule.files).rstrip()
-
-
-def removed_schedule_text(schedule: Schedule | None) -> str:
-    """What was removed, and how that is put in force."""
-    if schedule is None:
-        return "This cell has no schedule."
+    if not is_removed:
+        return "\n".join(f"{path}\n{path.read_text()}" for path in schedule.files).rstrip()
     control = _control(schedule)
     stop = f"  {control} stop {schedule.unit}.timer && {control} daemon-reload"
     return "\n".join([*(f"removed {path}" for path in schedule.files), "To put it in force:", stop])
-
-
-def crontab_text(line: str, stated: UnattendedSettings) -> str:
-    """The line, and where it belongs."""
-    tries = "the run tries again in its window" if stated.window_minutes else "cron does not try again"
-    return f"Put this line into `crontab -e`; {tries}, and cron mails what is said:\n{line}"
 
 
 def _control(schedule: Schedule) -> str:

@@ -5,6 +5,7 @@ from math import isnan
 
 import pytest
 
+from hexacell.cli.commands.study import STUDIES, design_lines
 from hexacell.study.design_records import OrientationChoice
 from hexacell.study.design_study import (
     DesignOutcome,
@@ -13,7 +14,6 @@ from hexacell.study.design_study import (
     design_summary,
     design_trials_of,
 )
-from hexacell.text.studies import STUDIES, design_lines
 
 
 def outcome(trial: DesignTrial) -> DesignOutcome:

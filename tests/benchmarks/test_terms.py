@@ -39,12 +39,16 @@ CANDIDATES = 512
 
 @dataclass(frozen=True)
 class Machine:
-    """Sizes of what is not geometry: mm, mm and um/N; and the largest ratio of its error to none's."""
+    """Sizes of what is not geometry: mm, mm and um/N; and the largest ratio of its error to none's.
+
+    It gets warmer by ``warmer_k`` an hour.
+    """
 
     backlash: float = 0.0
     play: float = 0.0
     compliance: float = 0.0
     at_most: float = 1.2
+    warmer_k: float = 0.0
 
     def drawn(self, random: np.random.Generator) -> dict[str, Array]:
         """Coefficients of each joint or leg: between half of the size and all of it, or within 20 %."""
@@ -62,6 +66,7 @@ MACHINES_OF_A_KIND = {
     "backlash 0.1 mm": Machine(backlash=0.1),
     "backlash 0.02 mm": Machine(backlash=0.02),
     "compliance 0.3 um/N": Machine(compliance=0.3),
+    "backlash, warmer by 3 K": Machine(backlash=0.1, warmer_k=3.0, at_most=1.4),
     "play and compliance": Machine(play=0.1, compliance=0.3, at_most=1.4),
     "all at a third": Machine(0.033, 0.033, 0.1, at_most=1.4),
 }
@@ -94,7 +99,7 @@ def carried_out(machine: Machine, number: int) -> Outcome:
     every = settings(CANDIDATES, tuple(name for name, sizes in coefficients.items() if sizes.any()))
     own = every[number % len(every)]
     robot = replace(own.robot, effects=budgets.machine("precision"), terms=terms_of(own.robot))
-    world = World(robot, own.truth, effect_of(coefficients), number)
+    world = World(robot, own.truth, effect_of(coefficients, machine.warmer_k), number)
     try:
         found = identify(robot.problem(world.records(own.commands, robot.commanding)))
         written = robot.with_controller(robot.for_controller(found.geometry))

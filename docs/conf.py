@@ -42,7 +42,7 @@ toc_object_entries = False
 nitpicky = True
 nitpick_ignore_regex = [  # only what a page documents can be linked to
     ("py:.*", r"(?!(hexacell\.(api|errors)|drivers\.(interfaces|errors))\.).*"),
-    ("py:.*", r".*\.Identity_co"),
+    ("py:.*", r".*\.(Identity_co|Device)"),
 ]
 
 html_theme = "furo"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import isfinite
+from math import ceil, isfinite, log10
 from pathlib import Path
 from typing import Protocol
 
@@ -145,9 +145,12 @@ class NumberToken:
         return value
 
 
-def write_number(value: float, decimals: int) -> str:
-    """``value`` with at most so many decimals and at least one, never ``-0.0``, no exponent."""
-    whole, _, rest = f"{value:.{decimals}f}".partition(".")
+def write_number(value: float, decimals: int, unit: float = 1.0) -> str:
+    """``value`` with at most so many decimals and at least one, never ``-0.0``, no exponent.
+
+    In a larger ``unit`` it has as many decimals more.
+    """
+    whole, _, rest = f"{value / unit:.{decimals + max(0, ceil(log10(unit)))}f}".partition(".")
     number = f"{whole}.{rest.rstrip('0') or '0'}"
     return "0.0" if number == "-0.0" else number
 

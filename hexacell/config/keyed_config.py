@@ -12,9 +12,8 @@ Which key holds which number follows from patterns in the cell file, one for eac
 both numbers, and only the correction is written: the nominal number stays as it is.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from math import ceil, log10
 from pathlib import Path
 from typing import Any, Protocol, Self, TypeVar, cast
 
@@ -30,7 +29,7 @@ from hexacell.config.interface import (
     token_error,
     write_number,
 )
-from hexacell.errors import FileError, UsageError
+from hexacell.errors import UsageError
 from hexacell.kinematics.corrections import CorrectionKind, Corrections
 from hexacell.kinematics.mechanism import Branch
 from hexacell.kinematics.parameters import LEGS, GeometricParameter, ParameterSet, ParameterUnit
@@ -204,30 +203,15 @@ class KeyedConfig:
             FileError: the text is no such config, or has no place for the corrections.
         """
         assert corrections is None  # noqa: S101 - such a text has a place for none of them
-        new = [(one, values[one.name]) for one in self._parameters.parameters if one.name in values]
-        changed = replace_tokens(text, dict(self._changed(self._open(text, None), new)))
-        self._require_kept(self._open(changed, None), new)
-        return changed
-
-    def _changed(
-        self, lookup: NumberLookup, new: Iterable[tuple[GeometricParameter, float]]
-    ) -> Iterator[tuple[NumberToken, str]]:
-        for parameter, wanted in new:
-            difference = wanted - self._value(lookup, parameter, None)
-            if abs(difference) > 0.5 * _resolution(parameter):
-                key = self._keys.corrections.get(parameter.name, self._keys.values[parameter.name])
-                token, unit = lookup.number(key), self._unit(parameter)
-                value = number_of(token, None) + difference / unit
-                more_decimals = max(0, ceil(log10(unit)))  # than a millimetre needs, in a larger unit
-                yield token, write_number(value, parameter.kind.unit.decimals + more_decimals)
-
-    def _require_kept(self, lookup: NumberLookup, new: Iterable[tuple[GeometricParameter, float]]) -> None:
-        for parameter, wanted in new:
-            if abs(self._value(lookup, parameter, None) - wanted) > _resolution(parameter):
-                raise FileError(
-                    f"the new geometry reads back with another {parameter.name}",
-                    action="Nothing was written; please report this with the config",
-                )
+        lookup, tokens = self._open(text, None), dict[NumberToken, str]()
+        for one in self._parameters.parameters:
+            if one.name not in values:
+                continue
+            difference, decimals = values[one.name] - self._value(lookup, one, None), one.kind.unit.decimals
+            if abs(difference) > 0.5 * 10.0**-decimals:
+                token, unit = lookup.number(self._keys_of(one)[-1]), self._unit(one)
+                tokens[token] = write_number(number_of(token, None) * unit + difference, decimals, unit)
+        return replace_tokens(text, tokens)
 
     def _value(self, lookup: NumberLookup, parameter: GeometricParameter, source: Path | None) -> float:
         tokens = [lookup.number(key) for key in self._keys_of(parameter)]
@@ -238,7 +222,7 @@ class KeyedConfig:
         return value
 
     def _keys_of(self, parameter: GeometricParameter) -> tuple[str, ...]:
-        """The keys of the numbers whose sum it is."""
+        """The keys of the numbers whose sum it is; the last one is that which is written."""
         keys = (self._keys.values[parameter.name], self._keys.corrections.get(parameter.name))
         return tuple(key for key in keys if key is not None)
 
@@ -257,8 +241,3 @@ class KeyedConfig:
         if (value := number_of(token, source)) not in {1.0, -1.0}:
             raise token_error(token, f"{key} is {token.text}", source, "It must be 1 or -1")
         return int(value)
-
-
-def _resolution(parameter: GeometricParameter) -> float:
-    """The last decimal of a parameter in its own unit."""
-    return float(10.0**-parameter.kind.unit.decimals)

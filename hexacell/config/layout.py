@@ -31,6 +31,9 @@ from hexacell.kinematics.parameters import JointUnit, ParameterSet
 from hexacell.plugins import Group, load
 from hexacell.storage import atomic_files
 
+CORRECTIONS_ROUNDED = 2e-6
+"""By how much a correction may read back otherwise, in its unit."""
+
 
 @dataclass(frozen=True, slots=True)
 class FormatOfFile:
@@ -99,7 +102,7 @@ class ConfigLayout:
     ) -> tuple[str, ...]:
         """The texts with the values of ``geometry`` and ``corrections``; every other character is kept.
 
-        Without ``corrections`` they stay as they are.
+        Without ``corrections`` they stay as they are. New texts are read again before they are returned.
 
         Raises:
             FileError: a text is no such config, or cannot hold its part of these; or the geometry has
@@ -118,6 +121,21 @@ class ConfigLayout:
             kinds = [kind for kind, where in places.items() if where == place]
             own = NO_CORRECTIONS.taking(corrections, kinds) if corrections is not None and kinds else None
             new.append(one.reader.rewrite(text, {name: values[name] for name in part.values}, own))
+        after = self._parts(new, [None] * len(new))
+        read_back, corrected = self._values(after, stand_ins), _corrections(after, stand_ins)[0]
+        wanted = found if corrections is None else found.taking(corrections, [*places])
+        wrong = [
+            one.name
+            for one in self.parameters.parameters
+            if abs(read_back[one.name] - values[one.name]) > 10.0**-one.kind.unit.decimals
+        ]
+        changes = wanted.changes_to(corrected, self.joint_unit)
+        wrong += [one.name for one in changes if abs(one.after - one.before) > CORRECTIONS_ROUNDED]
+        if wrong:
+            raise FileError(
+                f"the new config reads back with another {wrong[0]}",
+                action="Nothing was written; please report this with the config",
+            )
         return tuple(new)
 
     def _parts(self, texts: Sequence[str], sources: Sequence[Path | None]) -> list[ConfigPart]:

@@ -165,7 +165,7 @@ def test_every_mistake_is_named_with_its_line(tmp_path: Path, table: str, line: 
 def test_corrections_that_read_back_differently_are_never_written(monkeypatch: pytest.MonkeyPatch) -> None:
     geometry, replaced = geometry_in(CONFIG + WHOLE), TomlDocument.replaced
     monkeypatch.setattr(TomlDocument, "replaced", lambda *args: replaced(*args).replace("0.102", "0.12"))
-    with pytest.raises(FileError, match="read back with another backlash"):
+    with pytest.raises(FileError, match="reads back with another backlash"):
         NATIVE.rewrite([CONFIG + WHOLE], geometry, SOME)
 
 

@@ -8,7 +8,7 @@ resumption and its replay compute alike.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property, lru_cache, partial
@@ -36,15 +36,13 @@ from hexacell.noise.allowances import Allowances
 from hexacell.noise.measured_noise import MeasuredNoise, with_measured_noise
 from hexacell.noise.repeats import Repeats
 from hexacell.results.result import AcceptedResult
-from hexacell.results.term_result import known_terms, term_results
-from hexacell.results.written_geometry import as_written
+from hexacell.results.term_result import known_terms
 from hexacell.robot.model import Robot
 from hexacell.robot.stated import noise_of, stated_effects
 from hexacell.verdict.decision import ErrorLimits
 from hexacell.verdict.length_check import with_measured_scale
-from procedures.calibration.held_out_poses import HeldOutPoses, PosesByPoint, replacements
 from procedures.calibration.repeatability import noise_again, repeated_readings
-from procedures.run.keys import Phase, SetKey, SixNumbers
+from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState
 
 
@@ -104,16 +102,14 @@ class Calibration:
 
     def known(self, state: RunState) -> Knowledge:
         """What is known of the robot in a state of the run; one object as long as nothing new is learnt."""
-        parameters = self.robot.mechanism.parameters
-        lent, proposed = self.provisional_of(state), state.proposed
-        written = None if proposed is None else Geometry.of(parameters, proposed.written)
+        vector, lent, proposed = self.robot.mechanism.parameters.vector, state.provisional, state.proposed
         return self._knowledge(
             Learnt(
                 self.robot.refused | state.refused,
                 None if state.noise is None else state.noise.noise,
-                None if lent is None else tuple(lent.vector.tolist()),
+                None if lent is None else tuple(vector(lent.geometry).tolist()),
                 state.provisional_active,
-                None if written is None else tuple(written.vector.tolist()),
+                None if proposed is None else tuple(vector(proposed.written).tolist()),
                 None if proposed is None else proposed.corrections,
                 state.committed is not None,
             )
@@ -233,11 +229,6 @@ class Knowledge:
         """The quick level, from the accepted result on."""
         return QuickLevel(self.check, self.settings.quick.budget_records)
 
-    @property
-    def held_out_poses(self) -> HeldOutPoses:
-        """Chooses the held-out poses that are measured before the write-back."""
-        return self._held_out_poses(self.plan.robot)
-
     def robot_of(self, state: RunState) -> Robot:
         """The robot with all geometries that commanded the records of the identification."""
         if self.calibration.mode is Mode.QUICK:
@@ -290,46 +281,10 @@ class Knowledge:
         lent = self.calibration.provisional_of(state)
         return self.plan.estimate(campaign_state(state, None)).belief.estimate if lent is None else lent
 
-    def held_out_poses_after(self, identified: Identification, before: PosesByPoint) -> PosesByPoint:
-        """Held-out poses that the robot can take once the identified geometry is written."""
-        zeros = self.robot.identified_zeros(identified)
-        geometry, terms = (zeros or identified).geometry, term_results(identified)
-        written = as_written(self.settings, self.robot, geometry, terms)
-        after = self.robot.with_controller(written.geometry, written.corrections)
-        return self._held_out_poses(after).after(identified, before)
-
-    def confirming_poses(self, identified: Identification, state: RunState) -> PosesByPoint:
-        """Held-out poses unlike all that were measured, to confirm a failure."""
-        found = state.identified
-        assert found is not None  # noqa: S101 - callers have a result
-        chooser = self._held_out_poses(self.measuring.robot)
-        return chooser.confirming(identified, found.held_out, found.held_out_after)
-
-    def held_out_replacements(
-        self, identified: Identification, state: RunState
-    ) -> Iterator[tuple[SixNumbers, SixNumbers]]:
-        """Held-out poses that the controller refuses, each with another one, in the controller's frames.
-
-        Those that were measured before the write-back are not replaced after it: both are compared. A point
-        with too few others keeps what is left of its own, and one whose reference is refused is left.
-        """
-        found = state.identified
-        assert found is not None  # noqa: S101 - its poses are held out of an identification
-        references = [poses[0] if poses else None for poses in found.held_out]
-        if state.committed is None:
-            others = self.held_out_poses.after(identified, found.held_out)
-            yield from replacements(state.refused, references, found.held_out, others)
-        if found.held_out_after:
-            others = self.held_out_poses_after(identified, found.held_out)
-            yield from replacements(state.refused, references, found.held_out_after, others)
-
     @property
     def _written(self) -> Geometry:
         assert self.learnt.written is not None  # noqa: S101 - only then there is a proposal
         return Geometry(self.robot.mechanism.parameters, self.learnt.written)
-
-    def _held_out_poses(self, robot: Robot) -> HeldOutPoses:
-        return HeldOutPoses(self.settings, robot, self.calibration.effort.held_out_candidates)
 
     def _plan_of(self, robot: Robot) -> Plan:
         calibration = self.calibration
@@ -372,21 +327,19 @@ def campaign_state(state: RunState, key: SetKey | None) -> CampaignState:
     """
     sets = {at: measured for at, measured in state.sets.items() if at.phase is Phase.IDENTIFY}
     records = tuple(sample.record for measured in sets.values() for sample in measured.samples)
+    closed = {at.point for at, measured in sets.items() if measured.closed}
+    # Those whose reference the controller refuses cannot be measured.
+    refused = {one.at for one in state.excluded if one.at.phase is Phase.IDENTIFY}
+    left = {at.point for at in refused if state.is_left(at)}
     return CampaignState(
         measurements=MeasurementSet(records),
         point=None if key is None else key.point,
-        done=frozenset(at.point for at, measured in sets.items() if measured.closed) | _left_points(state),
+        done=frozenset(closed | left),
         present=_present_pose(state, key),
         rejections=0 if key is None else state.set(key).rejections,
         zero_mm=None if key is None else state.zero_shown(key),
         pilots=state.pilots,
     )
-
-
-def _left_points(state: RunState) -> frozenset[int]:
-    """Points that cannot be measured, because the controller refuses their reference."""
-    keys = {refused.at for refused in state.excluded if refused.at.phase is Phase.IDENTIFY}
-    return frozenset(key.point for key in keys if state.is_left(key))
 
 
 def _present_pose(state: RunState, key: SetKey | None) -> Pose | None:

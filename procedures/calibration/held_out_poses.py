@@ -17,11 +17,14 @@ from hexacell.design.validation_poses import select_near, select_validation_pose
 from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.result import Identification
-from hexacell.kinematics.commanded_motion import RefusedCommands
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
+from hexacell.results.term_result import term_results
+from hexacell.results.written_geometry import as_written
 from hexacell.robot.model import Robot
+from procedures.calibration.calibration import Knowledge
 from procedures.run.keys import SixNumbers
+from procedures.run.state import RunState
 
 CONFIRMING_SEED = 1_000_003
 """Added to the seed of the held-out orientations for those that confirm a failure."""
@@ -111,15 +114,50 @@ class HeldOutPoses:
         return tuple(command.as_tuple() for command in commands)
 
 
-def replacements(
-    refused: RefusedCommands,
-    references: Sequence[SixNumbers | None],
-    present: Sequence[Sequence[SixNumbers]],
-    others: Sequence[Sequence[SixNumbers]],
+def poses_before(known: Knowledge, identified: Identification) -> PosesByPoint:
+    """Held-out poses that are measured before the write-back; raises ``LimitError`` if there are none."""
+    return _chooser(known, known.plan.robot).before(identified)
+
+
+def poses_after(known: Knowledge, identified: Identification, before: PosesByPoint) -> PosesByPoint:
+    """Held-out poses that the robot can take once the identified geometry is written."""
+    zeros = known.robot.identified_zeros(identified)
+    geometry, terms = (zeros or identified).geometry, term_results(identified)
+    written = as_written(known.settings, known.robot, geometry, terms)
+    after = known.robot.with_controller(written.geometry, written.corrections)
+    return _chooser(known, after).after(identified, before)
+
+
+def confirming_poses(known: Knowledge, identified: Identification, state: RunState) -> PosesByPoint:
+    """Held-out poses unlike all that were measured, to confirm a failure."""
+    found = state.identified
+    assert found is not None  # noqa: S101 - callers have a result
+    chooser = _chooser(known, known.measuring.robot)
+    return chooser.confirming(identified, found.held_out, found.held_out_after)
+
+
+def held_out_replacements(
+    known: Knowledge, identified: Identification, state: RunState
 ) -> Iterator[tuple[SixNumbers, SixNumbers]]:
-    """The refused poses of each point with others of the same point that it does not have yet."""
-    for reference, poses, chosen in zip(references, present, others, strict=True):
-        if reference is not None and refused.allows(reference):
-            left_out = (pose for pose in poses if not refused.allows(pose))
-            new = (pose for pose in chosen if pose not in poses)
-            yield from zip(left_out, new, strict=False)
+    """Held-out poses that the controller refuses, each with another one, in the controller's frames.
+
+    Those that were measured before the write-back are not replaced after it: both are compared. A point
+    with too few others keeps what is left of its own, and one whose reference is refused is left.
+    """
+    found, replaced = state.identified, []
+    assert found is not None  # noqa: S101 - its poses are held out of an identification
+    if state.committed is None:
+        others = _chooser(known, known.plan.robot).after(identified, found.held_out)
+        replaced.append((found.held_out, others))
+    if found.held_out_after:
+        replaced.append((found.held_out_after, poses_after(known, identified, found.held_out)))
+    for present, others in replaced:
+        for before, poses, chosen in zip(found.held_out, present, others, strict=True):
+            if before and state.refused.allows(before[0]):
+                left_out = (pose for pose in poses if not state.refused.allows(pose))
+                new = (pose for pose in chosen if pose not in poses)
+                yield from zip(left_out, new, strict=False)
+
+
+def _chooser(known: Knowledge, robot: Robot) -> HeldOutPoses:
+    return HeldOutPoses(known.settings, robot, known.calibration.effort.held_out_candidates)

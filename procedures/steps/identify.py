@@ -12,7 +12,7 @@ from hexacell.verdict.assessment import Assessment, assess
 from hexacell.verdict.findings import findings
 from hexacell.verdict.fit_document import fit_document
 from procedures.calibration.calibration import Knowledge
-from procedures.calibration.held_out_poses import PosesByPoint
+from procedures.calibration.held_out_poses import PosesByPoint, poses_after, poses_before
 from procedures.calibration.repeatability import reversal_by_repeats
 from procedures.resources.run_resources import RunResources
 from procedures.run.keys import SixNumbers
@@ -62,7 +62,7 @@ class Identify(Computation):
         return Identified(
             result=IdentificationResult.of(identified, assessed.zeros),
             held_out=held_out,
-            held_out_after=known.held_out_poses_after(identified, held_out),
+            held_out_after=poses_after(known, identified, held_out),
             improvement=assessed.improvement,
             quick=known.quick.accuracy(measurements) if is_quick else None,
             reversal=reversal_by_repeats(known.plan, state, identified),
@@ -72,7 +72,7 @@ class Identify(Computation):
 def _held_out_poses(known: Knowledge, assessed: Assessment) -> PosesByPoint:
     """Choose held-out poses; the error states the verdict, as a wrong geometry may be the cause."""
     try:
-        return known.held_out_poses.before(assessed.found)
+        return poses_before(known, assessed.found)
     except LimitError as error:
         verdict, *_ = findings(assessed)
         raise LimitError(

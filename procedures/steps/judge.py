@@ -20,6 +20,7 @@ from hexacell.verdict.verification import (
     reason_of,
     verify,
 )
+from procedures.calibration.held_out_poses import confirming_poses
 from procedures.resources.run_resources import RunResources
 from procedures.run.keys import Phase, SixNumbers
 from procedures.run.readings import legs_warmer
@@ -83,7 +84,7 @@ class Judge(Computation):
         written = known.written_robot(state)
         verification = verify(known.settings, written, found, _held_out(known.settings, state))
         if verification.needs_confirmation and state.confirmation is None:
-            poses = known.confirming_poses(found, state)
+            poses = confirming_poses(known, found, state)
             if any(poses):
                 return ConfirmationPlanned(reason=reason_of(verification), poses=poses)
         assert state.identified is not None  # noqa: S101 - decided only after the identification

@@ -13,6 +13,7 @@ from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.pose import Pose
 from hexacell.lengths import from_to
+from procedures.calibration.held_out_poses import held_out_replacements
 from procedures.resources.run_resources import RunResources
 from procedures.run.cancellation import in_thread
 from procedures.run.keys import ArrivalDirections, Phase, SetKey, SixNumbers, ThreeNumbers
@@ -224,7 +225,7 @@ def _with_replacements(refusal: PoseExcluded, run: RunResources, state: RunState
     known = run.calibration.known(after)
     try:
         identified = identify(known.robot_of(after).problem(after.measurements()))
-        pairs = tuple(known.held_out_replacements(identified, after))
+        pairs = tuple(held_out_replacements(known, identified, after))
     except HexacellError:  # then those that are left are measured
         return refusal
     return refusal.model_copy(update={"replacements": pairs})

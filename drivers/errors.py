@@ -61,6 +61,21 @@ class InvalidSampleError(DeviceError):
     """An encoder reports an error that makes its position invalid, until it reports that it is gone."""
 
 
+def invalid_sample(
+    what: str,
+    subject: str,
+    action: str = "Remove the cause (magnet, distance, temperature), then measure again",
+) -> InvalidSampleError:
+    """The error for positions that the device itself reports as invalid, or that cannot be."""
+    return InvalidSampleError(f"{what}; its position cannot be trusted", subject=subject, action=action)
+
+
+def silent_encoder(what: str, subject: str, check: str = "its supply and cable") -> SilentNodeError:
+    """The error for an encoder that does not answer; ``check`` is what may be the cause."""
+    action = f"Check {check}, then open the encoders again; the set that was being measured is void"
+    return SilentNodeError(what, subject=subject, action=action)
+
+
 class NotHomedError(DeviceError):
     """Encoders that the controller reads have no position yet: its joints are not homed."""
 

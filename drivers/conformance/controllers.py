@@ -47,12 +47,6 @@ class ControllerConformance(Suite[Controller, ControllerTwin]):
         return self.driver(twin.settings)
 
     @against_twin
-    async def test_it_is_the_same_when_reopened(self, controller: Controller, twin: ControllerTwin) -> None:
-        first = await controller.open()
-        await controller.close()
-        assert await controller.open() == first
-
-    @against_twin
     async def test_it_does_what_is_permitted(self, controller: Controller, twin: ControllerTwin) -> None:
         await controller.open()
         assert isinstance(await failure(lambda: controller.prepare(frozenset())), StartupNotPermitted)

@@ -36,6 +36,21 @@ def require_named(error: BaseException | None, name: str) -> None:
     assert name in (error.subject or ""), f"{error} does not name {name}"
 
 
+def against_twin(check: Callable[[Any, DeviceT, TwinT], Awaitable[None]]) -> Callable[[Any], None]:
+    """A test of a suite, without arguments for pytest: the check of a device and its twin."""
+
+    def test(self: "Suite[DeviceT, TwinT]") -> None:
+        async def run() -> None:
+            with self.twin() as twin:
+                async with self._closed_after(twin) as device, asyncio.timeout(LONGEST_S):
+                    await check(self, device, twin)
+
+        asyncio.run(run())
+
+    test.__name__, test.__doc__ = check.__name__, check.__doc__
+    return test
+
+
 class Suite(ABC, Generic[DeviceT, TwinT]):
     """Subclass one of the suites in a test file, name it ``Test...``, and say what is tested."""
 
@@ -47,6 +62,12 @@ class Suite(ABC, Generic[DeviceT, TwinT]):
     def _driver_of(self, twin: TwinT) -> DeviceT:
         """The driver under test, for a twin."""
 
+    @against_twin
+    async def test_it_is_the_same_when_reopened(self, device: DeviceT, twin: TwinT) -> None:
+        first = await device.open()
+        await device.close()
+        assert await device.open() == first
+
     @asynccontextmanager
     async def _closed_after(self, twin: TwinT) -> AsyncIterator[DeviceT]:
         device = self._driver_of(twin)
@@ -54,18 +75,3 @@ class Suite(ABC, Generic[DeviceT, TwinT]):
             yield device
         finally:
             await device.close()
-
-
-def against_twin(check: Callable[[Any, DeviceT, TwinT], Awaitable[None]]) -> Callable[[Any], None]:
-    """A test of a suite, without arguments for pytest: the check of a device and its twin."""
-
-    def test(self: Suite[DeviceT, TwinT]) -> None:
-        async def run() -> None:
-            with self.twin() as twin:
-                async with self._closed_after(twin) as device, asyncio.timeout(LONGEST_S):
-                    await check(self, device, twin)
-
-        asyncio.run(run())
-
-    test.__name__, test.__doc__ = check.__name__, check.__doc__
-    return test

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any, ClassVar, Generic, TypeVar
 
-from drivers.encoders.node_monitor import invalid_sample
-from drivers.errors import BusError, WrongSetting
+from drivers.errors import BusError, WrongSetting, invalid_sample
 from drivers.interfaces import DeviceIdentity, EncoderSample
 from drivers.wire_trace import TraceRecorder
 from drivers.worker_thread import WorkerThread

@@ -13,7 +13,7 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.object_dictionary import ObjectEntry
-from drivers.errors import SilentNodeError
+from drivers.errors import SilentNodeError, silent_encoder
 from hexacell.errors import DeviceError
 
 _NMT = 0x000
@@ -100,11 +100,7 @@ class EncoderNode:
 
     def _communication_error(self, entry: ObjectEntry, error: Exception) -> SilentNodeError:
         self.check_alone()
-        return SilentNodeError(
-            f"does not respond for {entry}: {error}",
-            subject=self.leg.subject,
-            action="Check its supply and cable, then open the encoders again",
-        )
+        return silent_encoder(f"does not respond for {entry}: {error}", self.leg.subject)
 
 
 def setting_refused(what: str, leg: Leg) -> DeviceError:
@@ -125,12 +121,8 @@ def duplicated_node(what: str, leg: Leg) -> DeviceError:
 
 def silent_nodes(what: str, legs: Sequence[Leg], *, all_legs: bool) -> SilentNodeError:
     """The error for legs whose encoders are silent, or those of all legs."""
-    where = "the CAN adapter, supply and termination" if all_legs else "its supply and cable"
-    return SilentNodeError(
-        what,
-        subject=subject_of(legs),
-        action=f"Check {where}, then open the encoders again; the set that was being measured is void",
-    )
+    of_all = ("the CAN adapter, supply and termination",) if all_legs else ()
+    return silent_encoder(what, subject_of(legs), *of_all)
 
 
 SDO_REQUEST = 0x600

@@ -17,7 +17,7 @@ import can
 
 from drivers.encoders.bank import BankSession, ThreadedBank, bus_settings
 from drivers.encoders.can_bus import EncoderBus
-from drivers.errors import InvalidSampleError, SilentNodeError, optional
+from drivers.errors import invalid_sample, optional, silent_encoder
 from drivers.interfaces import DeviceIdentity
 from drivers.wire_trace import TraceRecorder
 from hexacell.cell.described_devices import DbcSettings
@@ -221,18 +221,13 @@ class DbcSession(BankSession):
         signals = self._database.signals
         for signal in signals:
             if signal.leg in fresh and fresh[signal.leg].problem:
-                raise InvalidSampleError(
-                    f"{fresh[signal.leg].problem}; its position cannot be trusted",
-                    subject=signal.subject,
-                    action="Remove the cause, or correct [encoders.dbc], then measure again",
-                )
+                action = "Remove the cause, or correct [encoders.dbc], then measure again"
+                raise invalid_sample(fresh[signal.leg].problem, signal.subject, action)
         for signal in signals:
             if signal.leg not in fresh:
-                raise SilentNodeError(
-                    f"sends nothing for {self._settings.timeout_s:g} s",
-                    subject=signal.subject,
-                    action="Check its supply and cable, and the message in the DBC file, then open the "
-                    "encoders again; the set that was being measured is void",
+                check = "its supply and cable, and the message in the DBC file"
+                raise silent_encoder(
+                    f"sends nothing for {self._settings.timeout_s:g} s", signal.subject, check
                 )
         if not complete:
             times = [one.at_s for one in latest.values()]

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from drivers.encoders.bank import BankSession, ThreadedBank
-from drivers.errors import BusError, InvalidSampleError, PortLost, SilentNodeError
+from drivers.errors import BusError, PortLost, invalid_sample, silent_encoder
 from drivers.interfaces import DeviceIdentity
 from drivers.serial.modbus_port import FUNCTIONS, REQUEST, ModbusPort, RefusedRequest
 from drivers.serial.opening import adapter_at
@@ -147,11 +147,10 @@ class ModbusSession(BankSession):
             found |= counts_in(self._answer(span), span, self._described, signed=self._settings.signed)
             for leg in span.legs:
                 if found[leg] in self._described.invalid:
-                    raise InvalidSampleError(
-                        f"shows {found[leg]}, which means no valid position; it cannot be trusted",
-                        subject=f"encoder of leg {leg}",
-                        action="Remove the cause, or correct invalid in [encoders.modbus], "
-                        "then measure again",
+                    raise invalid_sample(
+                        f"shows {found[leg]}, which means no valid position",
+                        f"encoder of leg {leg}",
+                        "Remove the cause, or correct invalid in [encoders.modbus], then measure again",
                     )
         return tuple(found[leg] for leg in sorted(found))
 
@@ -166,18 +165,12 @@ class ModbusSession(BankSession):
                 received = error.received
                 if not received:
                     break
-        void = "then open the encoders again; the set that was being measured is void"
+        what = f"does not answer within {self._settings.timeout_s:g} s"
+        check = "its supply and cable, and devices and serial in [encoders.modbus]"
         if received:
-            raise SilentNodeError(
-                f"answers {received!r}, no single frame with a right checksum, {DAMAGED_TRIES} times",
-                subject=span.subject,
-                action=f"Check its cable, and serial in [encoders.modbus], {void}",
-            )
-        raise SilentNodeError(
-            f"does not answer within {self._settings.timeout_s:g} s",
-            subject=span.subject,
-            action=f"Check its supply and cable, and devices and serial in [encoders.modbus], {void}",
-        )
+            what = f"answers {received!r}, no single frame with a right checksum, {DAMAGED_TRIES} times"
+            check = "its cable, and serial in [encoders.modbus]"
+        raise silent_encoder(what, span.subject, check)
 
 
 class ModbusBank(ThreadedBank[ModbusSession]):

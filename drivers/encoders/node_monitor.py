@@ -10,7 +10,7 @@ from canopen.emcy import EmcyError
 from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode, Leg, silent_nodes, subject_of
 from drivers.encoders.object_dictionary import ALARMS, ERROR_REGISTER, WARNINGS
-from drivers.errors import InvalidSampleError, RestartedNodeError
+from drivers.errors import RestartedNodeError, invalid_sample
 
 HEARTBEAT = 0x700
 EMERGENCY = 0x080
@@ -35,7 +35,6 @@ _KNOWN_EMERGENCIES = {
     0x8130: "its heartbeat monitoring tripped",
     0x8240: "it expects another length of SYNC",
 }
-_CHECK_DEVICE = "Remove the cause (magnet, distance, temperature), then measure again"
 _CHECK_BUS = "Open the encoders again; if it stays so, set the node with its vendor's tool"
 
 
@@ -111,13 +110,8 @@ def check_nodes(monitors: Sequence[NodeMonitor]) -> None:
         raise silent_nodes(what, [monitor.leg for monitor in silent], all_legs=len(silent) == len(monitors))
     for monitor in monitors:
         if monitor.emergency is not None:
-            action = _CHECK_BUS if monitor.is_about_the_bus else _CHECK_DEVICE
-            raise invalid_sample(f"reports {monitor.emergency}", monitor.leg.subject, action)
-
-
-def invalid_sample(what: str, subject: str, action: str = _CHECK_DEVICE) -> InvalidSampleError:
-    """The error for positions that the device itself reports as invalid, or that cannot be."""
-    return InvalidSampleError(f"{what}; its position cannot be trusted", subject=subject, action=action)
+            action = (_CHECK_BUS,) if monitor.is_about_the_bus else ()
+            raise invalid_sample(f"reports {monitor.emergency}", monitor.leg.subject, *action)
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,6 +46,13 @@ SET_NAMES = {
     Phase.CONFIRM: "held-out point {}, again",
     Phase.LENGTH: "length check, mounting {}",
 }
+STATIONS = {
+    Phase.IDENTIFY: "point {}",
+    Phase.BEFORE: "held-out point {}",
+    Phase.AFTER: "held-out point {} with the new geometry",
+    Phase.CONFIRM: "held-out point {} with the new geometry, confirming records",
+    Phase.LENGTH: "mounting {}",
+}
 
 
 class SetKey(Frozen):
@@ -63,16 +70,7 @@ class SetKey(Frozen):
     @property
     def station(self) -> str:
         """Where the gauges stand, and for what, in words."""
-        match self.phase:
-            case Phase.BEFORE:
-                return f"held-out point {self.point}"
-            case Phase.AFTER:
-                return f"held-out point {self.point} with the new geometry"
-            case Phase.CONFIRM:
-                return f"held-out point {self.point} with the new geometry, confirming records"
-            case Phase.LENGTH:
-                return f"mounting {self.point}"
-        return f"point {self.point}"
+        return STATIONS[self.phase].format(self.point)
 
     @property
     def seat(self) -> int:

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar
 
+from drivers.serial.modbus_port import BROADCAST
 from drivers.simulated.encoders.bank import JUMP, Positions, shown_positions
-from drivers.simulated.gauges.described import BROADCAST, WRITE_REGISTER, answer, refusal, split_requests
+from drivers.simulated.gauges.described import WRITE_REGISTER, answer, refusal, split_requests
 from drivers.simulated.gauges.instruments import Instrument
 from drivers.simulated.gauges.server import LATE_TIMEOUTS, GaugeLineServer, LineFault, LineFaults
 from drivers.simulated.serial_line import PtyLine, SerialLine

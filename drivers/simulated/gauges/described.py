@@ -5,6 +5,7 @@ import struct
 from collections.abc import Mapping
 from typing import ClassVar
 
+from drivers.gauges.described import FORMATS
 from drivers.simulated.gauges.instruments import MM_PER_INCH, Indicator, Instrument, SingleIndicator
 from hexacell.cell.described_devices import (
     DescribedFrame,
@@ -15,12 +16,10 @@ from hexacell.cell.described_devices import (
 )
 
 SOCKET = re.compile(r"socket://([\w.]+):(\d+)")
-PACKED = {"int16": ">h", "uint16": ">H", "int32": ">i", "uint32": ">I", "float32": ">f"}
 REQUEST_BYTES = 8
 ILLEGAL_ADDRESS = 2
 POLYNOMIAL = 0xA001
 WRITE_REGISTER = 6
-BROADCAST = 0
 
 
 class ByRequest(SingleIndicator):
@@ -192,5 +191,5 @@ class Modbus(Instrument):
         else:
             number = shown * (MM_PER_INCH if self.indicators[channel].inch else 1.0) / settings.mm_per_unit
         is_float = settings.type == "float32"
-        data = struct.pack(PACKED[settings.type], number if is_float else round(number))
+        data = struct.pack(FORMATS[settings.type], number if is_float else round(number))
         return data[2:] + data[:2] if settings.word_order == "little" else data

@@ -60,10 +60,6 @@ class RunProgress:
         """Print where the run is."""
         self._console.print(self._formatter.status_text(self._expected))
 
-    def hide(self) -> None:
-        """Remove the bar until the next event, so that a question can be shown."""
-        self.bar.stop()
-
 
 @contextmanager
 def task_bar(name: str) -> Iterator[Callable[[int, int], None]]:

@@ -169,15 +169,7 @@ class RunDeviceWatch:
 
     def note(self, event: events.Event, _: RunState | None = None) -> None:
         """Take an event of the run, as its listener: while the robot moves, noise is unknown."""
-        match event:
-            case events.StepBegun(step=step):
-                self._feed.is_moving = isinstance(step, Move)
-            case _:
-                self._feed.is_moving = False
-
-    def snapshot(self) -> LiveSnapshot:
-        """What the devices show now."""
-        return self._feed.snapshot()
+        self._feed.is_moving = isinstance(event, events.StepBegun) and isinstance(event.step, Move)
 
     async def fresh_snapshot(self) -> LiveSnapshot:
         """What they show once the gauges were read anew; at once if the run itself reads them."""
@@ -186,12 +178,12 @@ class RunDeviceWatch:
                 async with asyncio.timeout(FRESH_S), aclosing(self.live.changes(0.0)) as changes:
                     while any(gauge.age_s > SAMPLE_PERIOD_S for gauge in self._feed.gauges):
                         await anext(changes)
-        return self.snapshot()
+        return self._feed.snapshot()
 
     async def snapshots(self) -> AsyncIterator[LiveSnapshot]:
         """Snapshots after each change, until cancelled; noise is known only while they are taken."""
         async for _ in self.live.changes():
-            yield self.snapshot()
+            yield self._feed.snapshot()
 
     def close(self) -> None:
         """Read nothing any more."""

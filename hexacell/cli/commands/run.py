@@ -195,7 +195,7 @@ async def _calibrate(
     async with gauges_on_request(console, watching) as print_gauges:
         letters = {"g": print_gauges, "s": progress.print_status}
         keys = KeyboardCommands(console, queue.put, sys.stdin, letters)
-        request.operator.before_question, request.operator.after_question = progress.hide, keys.listen
+        request.operator.before_question, request.operator.after_question = progress.bar.stop, keys.listen
         request.operator.type_command = keys.take
         console.print(LETTERS)
         listeners: list[Listener] = [*further, progress, keys, watching.note]

@@ -33,7 +33,7 @@ from hexacell.verdict.check_statement import (
     guarded_verdict,
     records_to_decide,
 )
-from hexacell.verdict.decision import ErrorLimits, Verdict
+from hexacell.verdict.decision import Verdict
 
 USUAL_SCALES = (1.0, 3.0, 10.0)
 """All as likely as each other before measuring."""
@@ -127,7 +127,6 @@ class Check:
 
     Attributes:
         before: the last accepted result, and its drift since; None without such a result.
-        limits: largest errors at the worst task pose.
         budget: largest number of records, references included.
         listed: poses to measure; None if they are chosen.
         effects: the systematic ones. A check shares the constant ones with the result before it, so that
@@ -138,7 +137,6 @@ class Check:
     settings: CellSettings
     robot: Robot
     before: IdentifiedBefore | None
-    limits: ErrorLimits
     budget: int
     listed: PoseList | None = None
     effects: tuple[Effect, ...] = ()
@@ -196,7 +194,7 @@ class Check:
             # Each is as informative as those of well spread sets on average.
             whole = replace(self.plan, settings=self.settings)
             each = whole.information_per_record(likeliest.estimate.belief)
-            further = records_to_decide(errors[0], errors[1], self.limits, each)
+            further = records_to_decide(errors[0], errors[1], self.settings.acceptance, each)
         return replace(stated, verdict=Verdict.NOT_EVALUATED, further_records=further)
 
     def false_records(self, measurements: MeasurementSet) -> frozenset[RecordId]:
@@ -222,7 +220,7 @@ class Check:
         errors, found = estimates[0].errors, likeliest.estimate.identification
         # Whether the residuals are not too large for the stated noise.
         is_consistent = found is None or found.goodness.agreement is not ChiSquareVerdict.TOO_LARGE
-        verdict = guarded_verdict(errors, estimates[1].errors, self.limits)
+        verdict = guarded_verdict(errors, estimates[1].errors, self.settings.acceptance)
         return CheckStatement(
             estimate=likeliest.estimate,
             errors=errors,

@@ -92,12 +92,10 @@ def check_result(
         points=points,
         accuracy=VerifiedAccuracy.of(
             stated.errors,
-            check.limits,
+            check.settings,
             check.robot,
             task,
-            task_named=bool(check.settings.task.poses),
             length=None if earlier is None else earlier.length,
-            direction=check.settings.motion.sign,
         ),
         is_consistent=stated.is_consistent,
         further_records=stated.further_records,

@@ -14,11 +14,12 @@ the largest error J d over the task poses and its U by draws, as in a run (``doc
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from hexacell.campaign.planner import Plan
+from hexacell.cell.measuring import AcceptanceSettings
 from hexacell.design import candidates
 from hexacell.design.validation_poses import select_near
 from hexacell.errors import HexacellError, LimitError
@@ -34,7 +35,7 @@ from hexacell.robot.virtual_robot import exact_records
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.effects import Occurrence
 from hexacell.uncertainty.statement import COVERAGE, LargestError, covariance_factor
-from hexacell.verdict.decision import ErrorLimits, Verdict
+from hexacell.verdict.decision import Verdict, decide_both
 
 MACHINES = 500
 DRAWS = 1000
@@ -59,8 +60,8 @@ class VerdictForecast:
     """
 
     probabilities: Mapping[Verdict, float]
-    limits: ErrorLimits
-    passing: ErrorLimits
+    limits: AcceptanceSettings
+    passing: AcceptanceSettings
     largest_part: str
     largest_part_mm: float
     standard_mm: float
@@ -78,14 +79,16 @@ class VerdictForecast:
         return cls(
             {verdict: float(np.mean([one.probabilities[verdict] for one in each])) for verdict in Verdict},
             worst.limits,
-            replace(worst.passing, orientation_deg=degrees),
+            worst.passing.model_copy(update={"orientation_deg": degrees}),
             worst.largest_part,
             worst.largest_part_mm,
             worst.standard_mm,
         )
 
 
-def forecast_verdicts(stated: Array, budget: UncertaintyBudget, limits: ErrorLimits) -> VerdictForecast:
+def forecast_verdicts(
+    stated: Array, budget: UncertaintyBudget, limits: AcceptanceSettings
+) -> VerdictForecast:
     """The verdicts on machines that are drawn.
 
     Args:
@@ -102,23 +105,20 @@ def forecast_verdicts(stated: Array, budget: UncertaintyBudget, limits: ErrorLim
     around = np.tensordot(draws, unknown, axes=(1, 2))
     positions = _statements(errors[..., :3], around[..., :3])
     orientations = _statements(np.degrees(errors[..., 3:]), np.degrees(around[..., 3:]))
-    verdicts = [
-        limits.decide_largest(first, second) for first, second in zip(positions, orientations, strict=True)
-    ]
+    verdicts = [decide_both(*both, limits) for both in zip(positions, orientations, strict=True)]
     parts = [(line.combined_mm, line.effect.name) for line in budget.lines if not line.effect.is_estimated]
     part, name = max([(budget.noise_mm, NOISE), *parts])
     factor = limits.guard_band_factor
+    passing = {
+        "position_mm": _passing(positions, factor),
+        "orientation_deg": _passing(orientations, factor),
+    }
     # The tests of the model fail independently.
     tested = (1.0 - SMALLEST_PROBABILITY) ** TESTS
     shares = {verdict: tested * verdicts.count(verdict) / len(verdicts) for verdict in Verdict}
     shares[Verdict.NOT_EVALUATED] += 1.0 - tested
     return VerdictForecast(
-        shares,
-        limits,
-        ErrorLimits(_passing(positions, factor), _passing(orientations, factor), factor),
-        name,
-        part,
-        budget.standard_mm,
+        shares, limits, limits.model_copy(update=passing), name, part, budget.standard_mm
     )
 
 
@@ -187,9 +187,8 @@ def predicted_verdicts(
     after = plan.task.budget(updated, plan.robot.belief(updated), plan.robot.effects)
     if budget is None or after is None or len(after.jacobian) != len(budget.jacobian):
         return None
-    limits = ErrorLimits.of(plan.settings.acceptance)
     stated = stated_errors(found, updated, budget, after, plan.robot.identified_zeros(found))
-    return forecast_verdicts(stated, after, limits)
+    return forecast_verdicts(stated, after, plan.settings.acceptance)
 
 
 def with_held_out_records(plan: Plan, found: Identification) -> Identification:

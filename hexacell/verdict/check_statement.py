@@ -10,11 +10,12 @@ import numpy as np
 
 from hexacell.campaign.online_estimate import OnlineEstimate
 from hexacell.campaign.task_accuracy import Task
+from hexacell.cell.measuring import AcceptanceSettings
 from hexacell.design.criteria import add_information
 from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effects import Effect
 from hexacell.uncertainty.statement import TaskErrors
-from hexacell.verdict.decision import ErrorLimits, Verdict
+from hexacell.verdict.decision import Verdict, decide_both
 
 MOST_FURTHER_RECORDS = 200
 """A verdict that takes more is not forecast: repeatability and drift end what records can do before."""
@@ -105,19 +106,19 @@ def is_final(verdict: Verdict) -> bool:
     return verdict in {Verdict.PASS, Verdict.FAIL}
 
 
-def guarded_verdict(likeliest: TaskErrors, guarded: TaskErrors, limits: ErrorLimits) -> Verdict:
+def guarded_verdict(likeliest: TaskErrors, guarded: TaskErrors, limits: AcceptanceSettings) -> Verdict:
     """The verdict by the likeliest errors; a pass holds for the guarded ones as well.
 
     These are already those of a robot that drifted more than it is likely to: of them a pass keeps U alone.
     """
-    verdict, with_u_alone = limits.decide(likeliest), replace(limits, guard_band_factor=1.0)
-    if verdict is Verdict.PASS and with_u_alone.decide(guarded) is not Verdict.PASS:
-        return Verdict.CONDITIONAL_PASS
-    return verdict
+    verdict = decide_both(likeliest.position, likeliest.orientation, limits)
+    with_u_alone = limits.model_copy(update={"guard_band_factor": 1.0})
+    holds = decide_both(guarded.position, guarded.orientation, with_u_alone) is Verdict.PASS
+    return verdict if holds or verdict is not Verdict.PASS else Verdict.CONDITIONAL_PASS
 
 
 def records_to_decide(
-    likeliest: ErrorEstimate, guarded: ErrorEstimate, limits: ErrorLimits, per_record: Array
+    likeliest: ErrorEstimate, guarded: ErrorEstimate, limits: AcceptanceSettings, per_record: Array
 ) -> int | None:
     """How many more records would decide if they confirm the likeliest estimate.
 

@@ -12,7 +12,6 @@ then nothing is decided. Source: ILAC-G8:09/2019, Guidelines on decision rules a
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from enum import StrEnum
 from math import isfinite
 from typing import TYPE_CHECKING, Literal, Self
@@ -26,6 +25,7 @@ from hexacell.uncertainty.statement import LargestError, TaskErrors
 
 if TYPE_CHECKING:
     from hexacell.campaign.task_accuracy import Task
+    from hexacell.cell.model import CellSettings
     from hexacell.robot.model import Robot
 
 
@@ -106,31 +106,12 @@ def worst_verdict(verdicts: Iterable[Verdict]) -> Verdict:
     return max(verdicts, key=order.index, default=Verdict.NOT_EVALUATED)
 
 
-@dataclass(frozen=True, slots=True)
-class ErrorLimits:
-    """Limits of the largest position error, mm, and of the largest orientation error, deg.
-
-    ``guard_band_factor`` is the guard band as a multiple of U.
-    """
-
-    position_mm: float
-    orientation_deg: float
-    guard_band_factor: float = 1.0
-
-    @classmethod
-    def of(cls, settings: AcceptanceSettings) -> ErrorLimits:
-        """The limits of a cell."""
-        return cls(settings.position_mm, settings.orientation_deg, settings.guard_band_factor)
-
-    def decide(self, errors: TaskErrors) -> Verdict:
-        """The verdict on both errors together."""
-        return self.decide_largest(errors.position, errors.orientation)
-
-    def decide_largest(self, position: LargestError, orientation: LargestError) -> Verdict:
-        """The verdict on the largest errors, mm and deg, together."""
-        of_position = decide(position, self.position_mm, self.guard_band_factor)
-        of_orientation = decide(orientation, self.orientation_deg, self.guard_band_factor)
-        return worst_verdict([of_position, of_orientation])
+def decide_both(position: LargestError, orientation: LargestError, limits: AcceptanceSettings) -> Verdict:
+    """The verdict on the largest errors, mm and deg, together."""
+    of_position = decide(position, limits.position_mm, limits.guard_band_factor)
+    return worst_verdict(
+        [of_position, decide(orientation, limits.orientation_deg, limits.guard_band_factor)]
+    )
 
 
 class GeometryErrors(Frozen):
@@ -140,7 +121,7 @@ class GeometryErrors(Frozen):
     orientation: JudgedError
 
     @classmethod
-    def of(cls, errors: TaskErrors, limits: ErrorLimits) -> Self:
+    def of(cls, errors: TaskErrors, limits: AcceptanceSettings) -> Self:
         """The decision on errors under limits."""
         factor = limits.guard_band_factor
         return cls(
@@ -183,29 +164,28 @@ class VerifiedAccuracy(Frozen):
     def of(
         cls,
         errors: TaskErrors,
-        limits: ErrorLimits,
+        settings: CellSettings,
         robot: Robot,
         task: Task,
         *,
-        task_named: bool,
         of_geometry: TaskErrors | None = None,
         alone: TaskErrors | None = None,
         length: LengthResult | None = None,
-        direction: Literal[-1, 0, 1] = 0,
     ) -> VerifiedAccuracy:
         """The decision on errors at the poses of a ``task`` that the ``robot`` reaches."""
-        joint_unit, judged = robot.mechanism.words.joint_unit, GeometryErrors.of(errors, limits)
+        joint_unit, limits = robot.mechanism.words.joint_unit, settings.acceptance
+        judged = GeometryErrors.of(errors, limits)
         return cls(
             position=judged.position,
             orientation=judged.orientation,
             poses=len(task.poses),
-            task_named=task_named,
+            task_named=bool(settings.task.poses),
             of_geometry=None if of_geometry is None else GeometryErrors.of(of_geometry, limits),
             alone=None if alone is None else GeometryErrors.of(alone, limits).position,
             worst=robot.to_command(task.poses.pose(errors.worst)).as_tuple(),
             length=length,
             scale_of="encoders" if joint_unit is JointUnit.MM else "drawing",
-            direction=direction,
+            direction=settings.motion.sign,
         )
 
     @property

@@ -30,7 +30,7 @@ from hexacell.results.absorbed_terms import errors_of_geometry_alone
 from hexacell.results.result import IdentificationResult, LengthResult
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.length_records import JudgedGeometry
-from hexacell.verdict.decision import ErrorLimits, Verdict, VerifiedAccuracy, worst_verdict
+from hexacell.verdict.decision import Verdict, VerifiedAccuracy, worst_verdict
 from hexacell.verdict.length_check import LengthMeasurements, LengthStatement, length_check, length_result
 from hexacell.verdict.model_evidence import (
     ZEROS_DOUBTED,
@@ -203,17 +203,9 @@ def verified_accuracy(
     difference = written - updated.free
     errors = budget.errors_of(difference)
     of_geometry = budget.errors_of(difference, of_geometry=True) if budget.scatters else None
-    limits, is_named = ErrorLimits.of(settings.acceptance), bool(settings.task.poses)
+    alone = errors_of_geometry_alone(settings, robot, updated)
     return VerifiedAccuracy.of(
-        errors,
-        limits,
-        robot,
-        task,
-        task_named=is_named,
-        of_geometry=of_geometry,
-        alone=errors_of_geometry_alone(settings, robot, updated),
-        length=length,
-        direction=settings.motion.sign,
+        errors, settings, robot, task, of_geometry=of_geometry, alone=alone, length=length
     )
 
 

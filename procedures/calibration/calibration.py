@@ -39,7 +39,6 @@ from hexacell.results.result import AcceptedResult
 from hexacell.results.term_result import known_terms
 from hexacell.robot.model import Robot
 from hexacell.robot.stated import noise_of, stated_effects
-from hexacell.verdict.decision import ErrorLimits
 from hexacell.verdict.length_check import with_measured_scale
 from procedures.calibration.repeatability import noise_again, repeated_readings
 from procedures.run.keys import Phase, SetKey
@@ -216,7 +215,6 @@ class Knowledge:
             self.settings,
             robot,
             before,
-            ErrorLimits.of(self.settings.acceptance),
             wanted.budget_records,
             calibration.listed,
             robot.effects,

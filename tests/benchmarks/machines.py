@@ -22,7 +22,6 @@ from hexacell.kinematics.mechanism import free_parameter_derivatives
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.model import Robot, robot_of
 from hexacell.robot.virtual_robot import VirtualRobot, random_robot
-from hexacell.verdict.decision import ErrorLimits
 
 Job = TypeVar("Job")
 Outcome = TypeVar("Outcome")
@@ -94,8 +93,7 @@ class Calibrated:
         """A check of it, with so many records at most."""
         settings = bundled().settings
         before = identified_before(self.robot, self.covariance, STATED_DRIFT_MM)
-        limits = ErrorLimits.of(settings.acceptance)
-        return Check(settings, self.robot, before, limits, budget, effort=EFFORT)
+        return Check(settings, self.robot, before, budget, effort=EFFORT)
 
     def built(self, change: Array) -> Geometry:
         """The geometry whose free parameters differ by (p,) from the controller's."""

@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hexacell.cell.measuring import AcceptanceSettings
 from hexacell.uncertainty.statement import LargestError
-from hexacell.verdict.decision import ErrorLimits, Verdict, decide, worst_verdict
+from hexacell.verdict.decision import Verdict, decide, decide_both, worst_verdict
 
 
 @pytest.mark.parametrize(
@@ -42,7 +43,8 @@ def test_a_limit_with_a_guard_band(value: float, expanded: float, verdict: Verdi
 def test_a_guard_band_wider_than_u(value: float, verdict: Verdict) -> None:
     position, orientation = LargestError(value, 0.06), LargestError(0.0, 0.1)
     assert decide(position, 0.15, guard_band_factor=1.5) is verdict
-    assert ErrorLimits(0.15, 1.0, 1.5).decide_largest(position, orientation) is verdict
+    limits = AcceptanceSettings(position_mm=0.15, orientation_deg=1.0, guard_band_factor=1.5)
+    assert decide_both(position, orientation, limits) is verdict
 
 
 def test_a_limit_within_a_wide_guard_band_is_not_passed() -> None:

@@ -11,6 +11,7 @@ from hexacell.campaign.decisions import CampaignState, Decision, Finished, Finis
 from hexacell.campaign.planner import Plan
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
+from hexacell.cell.measuring import AcceptanceSettings
 from hexacell.checks.check import Check, identified_before
 from hexacell.config.layout import ConfigLayout
 from hexacell.design.candidate_refinement import QUICK, SearchEffort
@@ -18,7 +19,6 @@ from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot.model import Robot, make_robot
 from hexacell.robot.virtual_robot import VirtualRobot
-from hexacell.verdict.decision import ErrorLimits
 
 FEW = SearchEffort(candidates=64, dry_run_robots=1, rounds=QUICK)
 TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
@@ -59,8 +59,9 @@ def check_of(
         robot = calibrated_to(robot, truth)
         covariance = known_mm**2 * np.eye(len(robot.mechanism.parameters))
         before = identified_before(robot, covariance, drift_mm)
-    limits = ErrorLimits(position_mm=0.15, orientation_deg=0.05)
-    return Check(plan.settings, robot, before, limits, budget, effort=SearchEffort(candidates=32))
+    limits = AcceptanceSettings(position_mm=0.15, orientation_deg=0.05, guard_band_factor=1.0)
+    settings = plan.settings.model_copy(update={"acceptance": limits})
+    return Check(settings, robot, before, budget, effort=SearchEffort(candidates=32))
 
 
 def measured_by(plan: Plan, truth: Geometry, random: np.random.Generator) -> CampaignState:

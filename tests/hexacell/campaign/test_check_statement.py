@@ -6,17 +6,18 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from hexacell.cell.measuring import AcceptanceSettings
 from hexacell.verdict.check_statement import (
     MOST_FURTHER_RECORDS,
     ErrorEstimate,
     guarded_verdict,
     records_to_decide,
 )
-from hexacell.verdict.decision import ErrorLimits, Verdict
+from hexacell.verdict.decision import Verdict, decide_both
 
 QUANTILE = float(np.sqrt(chi2.ppf(0.95, 3)))
 NONE = np.zeros((1, 6, 0))
-LIMITS = ErrorLimits(position_mm=0.15, orientation_deg=0.05)
+LIMITS = AcceptanceSettings(position_mm=0.15, orientation_deg=0.05, guard_band_factor=1.0)
 
 
 def at_one_pose(error: tuple[float, float, float] = (0.0, 0.0, 0.0), sigma: float = 0.1) -> ErrorEstimate:
@@ -38,9 +39,9 @@ def test_a_pass_holds_for_both_estimates() -> None:
 
 def test_of_the_guarded_errors_a_pass_keeps_u_alone() -> None:
     """They are those of a larger drift already; the likeliest ones keep the whole guard band."""
-    wide = replace(LIMITS, guard_band_factor=1.5)
+    wide = LIMITS.model_copy(update={"guard_band_factor": 1.5})
     sure, unsure = at_one_pose(sigma=0.03), at_one_pose(sigma=0.05)
-    assert wide.decide(unsure.errors) is not Verdict.PASS
+    assert decide_both(unsure.errors.position, unsure.errors.orientation, wide) is not Verdict.PASS
     assert guarded_verdict(sure.errors, unsure.errors, wide) is Verdict.PASS
     assert guarded_verdict(unsure.errors, unsure.errors, wide) is not Verdict.PASS
 

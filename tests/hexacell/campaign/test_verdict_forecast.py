@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hexacell.cell.measuring import AcceptanceSettings
 from hexacell.cell.uncertainty import UncertaintySettings
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.dry_run.verdict_forecast import (
@@ -20,11 +21,19 @@ from hexacell.identification.diagnostics.model_tests import update
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.forward import continue_solution
 from hexacell.robot.virtual_robot import VirtualRobot
-from hexacell.verdict.decision import ErrorLimits, Verdict
+from hexacell.verdict.decision import Verdict
 
 MACHINES = 60
 SCALE_UM_M = 60.0
-LIMITS = ErrorLimits(0.15, 0.05)
+
+
+def limits_of(position_mm: float, orientation_deg: float) -> AcceptanceSettings:
+    return AcceptanceSettings(
+        position_mm=position_mm, orientation_deg=orientation_deg, guard_band_factor=1.0
+    )
+
+
+LIMITS = limits_of(0.15, 0.05)
 
 
 class Cell:
@@ -115,13 +124,15 @@ def test_what_will_be_stated_is_as_large_as_in_simulated_verifications(cell, sim
 def test_95_percent_pass_the_limits_that_are_proposed(cell, forecast) -> None:
     stated = stated_errors(cell.found, cell.updated, cell.first, cell.second)
     far = 100.0 * forecast.passing.orientation_deg
-    told = forecast_verdicts(stated, cell.second, replace(forecast.passing, orientation_deg=far))
+    told = forecast_verdicts(
+        stated, cell.second, forecast.passing.model_copy(update={"orientation_deg": far})
+    )
     assert told.probabilities[Verdict.PASS] == pytest.approx(0.95 * 0.997, abs=0.003)
     assert not told.is_wanted  # by the tests of the model
-    wide = forecast_verdicts(stated, cell.second, ErrorLimits(far, far))
+    wide = forecast_verdicts(stated, cell.second, limits_of(far, far))
     assert wide.is_wanted
     assert wide.probabilities[Verdict.PASS] == pytest.approx(0.997, abs=1e-3)
-    tight = forecast_verdicts(stated, cell.second, ErrorLimits(1e-6, 1e-6))
+    tight = forecast_verdicts(stated, cell.second, limits_of(1e-6, 1e-6))
     assert tight.probabilities[Verdict.PASS] == 0.0
 
 
@@ -136,7 +147,7 @@ def test_of_several_robots_the_shares_are_averaged_and_the_worst_is_told() -> No
     def of(share, limit):
         probabilities = dict.fromkeys(Verdict, 0.0) | {Verdict.PASS: share, Verdict.FAIL: 1.0 - share}
         return VerdictForecast(
-            probabilities, LIMITS, ErrorLimits(limit, 0.2 - limit), f"part {limit}", limit, 2.0 * limit
+            probabilities, LIMITS, limits_of(limit, 0.2 - limit), f"part {limit}", limit, 2.0 * limit
         )
 
     mean = VerdictForecast.mean([of(0.9, 0.1), of(0.5, 0.15)])

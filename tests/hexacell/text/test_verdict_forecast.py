@@ -1,16 +1,18 @@
 """What preflight says of the limits: how likely a healthy machine passes, and what would help."""
 
+from hexacell.cell.measuring import AcceptanceSettings
 from hexacell.dry_run.verdict_forecast import NOISE, VerdictForecast
 from hexacell.text.planning import verdict_forecast_lines
-from hexacell.verdict.decision import ErrorLimits, Verdict
+from hexacell.verdict.decision import Verdict
 
 NONE = dict.fromkeys(Verdict, 0.0)
 
 
 def forecast(passed: float, part: str = NOISE, *, position: float = 0.2, orientation: float = 0.01):
     probabilities = NONE | {Verdict.PASS: passed, Verdict.CONDITIONAL_PASS: 1.0 - passed}
-    passing = ErrorLimits(position, orientation)
-    return VerdictForecast(probabilities, ErrorLimits(0.15, 0.05), passing, part, 0.064, 0.072)
+    passing = AcceptanceSettings(position_mm=position, orientation_deg=orientation)
+    limits = AcceptanceSettings(position_mm=0.15, orientation_deg=0.05)
+    return VerdictForecast(probabilities, limits, passing, part, 0.064, 0.072)
 
 
 def test_limits_that_good_machines_fail_are_warned_of_with_what_would_do() -> None:

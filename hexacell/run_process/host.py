@@ -171,16 +171,14 @@ class RunHost:
 
     def _on_question(self, question: Question | None) -> None:
         self._question = question
-        self._audience.send(
-            messages.QuestionClosed() if question is None else messages.QuestionOpened(question=question)
-        )
+        self._audience.send(messages.QuestionChanged(question=question))
         self._reconsider()
 
     def _opening(self) -> list[bytes]:
         """The lines that a new client receives first."""
         present = [messages.message_line(messages.StatusChanged(status=self._status))]
         if self._question is not None:
-            present.append(messages.message_line(messages.QuestionOpened(question=self._question)))
+            present.append(messages.message_line(messages.QuestionChanged(question=self._question)))
         if self._failure is not None:
             present.append(messages.message_line(self._failure))
         return [*self._lines, *present]

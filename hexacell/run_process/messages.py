@@ -129,17 +129,11 @@ class StatusChanged(Frozen):
     status: Status
 
 
-class QuestionOpened(Frozen):
-    """A question waits for an :class:`~procedures.engine.commands.Answer`."""
+class QuestionChanged(Frozen):
+    """The question that waits for an :class:`~procedures.engine.commands.Answer`, if any."""
 
     kind: Literal["question"] = "question"
-    question: Question
-
-
-class QuestionClosed(Frozen):
-    """The question was answered, or given up."""
-
-    kind: Literal["question closed"] = "question closed"
+    question: Question | None
 
 
 class ControlChanged(Frozen):
@@ -199,8 +193,7 @@ HostMessage = Annotated[
     RunDescribed
     | EventRecorded
     | StatusChanged
-    | QuestionOpened
-    | QuestionClosed
+    | QuestionChanged
     | LiveSnapshot
     | ControlChanged
     | CursorMoved

@@ -129,9 +129,7 @@ class RecordedRun:
                 status = Status.PAUSED
             case events.StepBegun(step=Place(at=at, pose=pose)):
                 status, question = Status.AWAITING_OPERATOR, ask_placement(at, Pose(*pose))
-        asked = (
-            protocol.QuestionClosed() if question is None else protocol.QuestionOpened(question=question)
-        )
+        asked = protocol.QuestionChanged(question=question)
         return [protocol.StatusChanged(status=status), asked, at_cursor]
 
     async def _until_moved(self, sent: int) -> None:

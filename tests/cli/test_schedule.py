@@ -108,8 +108,6 @@ def test_what_makes_no_sense_is_refused(schedule, units) -> None:
     for words, problem in (
         (["--daily", "25:00"], "'25:00' is no time of day"),
         ([], "the time of day is missing"),
-        (["--daily", "02:30", "--on-failure", "a\nUser=root"], "is no name of a unit"),
-        (["--daily", "02:30", "--cron", "--on-failure", "mail.service"], "only systemd"),
         (["--daily", "02:30", "--show"], "not allowed with"),
     ):
         outcome = schedule(*words)

@@ -16,8 +16,7 @@ from hexacell.run_process.messages import (
     GaugeSnapshot,
     HostMessage,
     LiveSnapshot,
-    QuestionClosed,
-    QuestionOpened,
+    QuestionChanged,
     RunDescribed,
     Shown,
     StatusChanged,
@@ -103,11 +102,11 @@ class ToldRun:
 
     def ask(self, question: Question) -> None:
         """Open a question."""
-        self.tell(QuestionOpened(question=question), StatusChanged(status=Status.AWAITING_OPERATOR))
+        self.tell(QuestionChanged(question=question), StatusChanged(status=Status.AWAITING_OPERATOR))
 
     def close_question(self) -> None:
         """Close it."""
-        self.tell(QuestionClosed(), StatusChanged(status=Status.RUNNING))
+        self.tell(QuestionChanged(question=None), StatusChanged(status=Status.RUNNING))
 
     def end(self) -> None:
         """The host is gone."""

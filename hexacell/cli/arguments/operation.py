@@ -60,7 +60,6 @@ def _schedule(commands: Any) -> None:  # noqa: ANN401
         help="check: change nothing (default); quick: correct what has drifted, optimise: recalibrate, "
         "and apply only within the limits",
     )
-    add_value(parser, "--on-failure", "UNIT", "unit that systemd starts after a failure")
     add_file(parser, "--metrics", "write metrics of the cell there after each run")
     add_flag(parser, "--cron", "print a crontab line instead")
     add_value(parser, "--folder", "FOLDER", "where the units are, if elsewhere", Path)

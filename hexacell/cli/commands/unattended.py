@@ -132,11 +132,9 @@ def schedule(options: argparse.Namespace, console: Console) -> ExitCode:
 
 
 def _write(cell: Cell, options: argparse.Namespace, console: Console) -> None:
-    run = scheduled_run(cell, options.daily, options.mode, options.on_failure, options.metrics)
+    run = scheduled_run(cell, options.daily, options.mode, options.metrics)
     stated = cell.settings.unattended
     if options.cron:
-        if options.on_failure is not None:
-            raise UsageError("only systemd starts a unit on a failure", action="Leave --on-failure away")
         line = crontab_line(run)
         tries = "the run tries again in its window" if stated.window_minutes else "cron does not try again"
         text = f"Put this line into `crontab -e`; {tries}, and cron mails what is said:\n{line}"

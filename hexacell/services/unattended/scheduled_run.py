@@ -35,7 +35,6 @@ class ScheduledRun:
             device, the lock).
         writable: the folders that it writes into: of the cell, of the controller's config, of metrics.
         metrics: the file that they are written to after each run, if any.
-        on_failure: the unit that systemd starts after a failure, if any.
     """
 
     cell: Path
@@ -49,7 +48,6 @@ class ScheduledRun:
     retry_minutes: ClassVar[int] = 15
     writable: tuple[Path, ...]
     metrics: Path | None = None
-    on_failure: str | None = None
 
     @property
     def words(self) -> tuple[str, ...]:

@@ -2,7 +2,6 @@
 
 import grp
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -37,7 +36,6 @@ SPARE_MINUTES = 10.0
 """Beside its longest duration, for a run to go back to its reference."""
 
 MOST_RETRIES = 3
-_UNIT_NAME = re.compile(r"[A-Za-z0-9:_.@%\\-]+\.[a-z]+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,10 +53,8 @@ class Schedule:
     complaints: tuple[str, ...] = ()
 
 
-def scheduled_run(
-    cell: Cell, daily: str, mode: str, on_failure: str | None, metrics: Path | None
-) -> ScheduledRun:
-    """What is to be started, each day at the time ``daily``; ``on_failure`` is the unit of a failure.
+def scheduled_run(cell: Cell, daily: str, mode: str, metrics: Path | None) -> ScheduledRun:
+    """What is to be started, each day at the time ``daily``.
 
     What the cell file says of window and longest duration the run itself keeps: a service must leave it the
     time for that, and does not try again what was tried for a whole window.
@@ -90,7 +86,6 @@ def scheduled_run(
         retries=0 if stated.window_minutes else min(MOST_RETRIES, tries - 1),
         writable=tuple(dict.fromkeys((*folders, *([] if metrics is None else [metrics.parent])))),
         metrics=metrics,
-        on_failure=on_failure,
     )
     _require_possible(cell, run)
     return run
@@ -164,10 +159,6 @@ def _require_possible(cell: Cell, run: ScheduledRun) -> None:
         raise UsageError("a path with control characters cannot be scheduled", subject=cell.path)
     if run.metrics is not None and not run.metrics.parent.is_dir():
         raise UsageError("the folder of the metrics does not exist", subject=run.metrics, action="Make it")
-    if run.on_failure is not None and not _UNIT_NAME.fullmatch(run.on_failure):
-        raise UsageError(
-            f"'{run.on_failure}' is no name of a unit", action="Write it as mail-me@%n.service"
-        )
 
     at = 60 * run.hour + run.minute
     for begin, length in settings.unattended.quiet_spans:

@@ -89,10 +89,8 @@ def picture_after(  # noqa: PLR0911 - a case a message
             return _with_event(picture, message)
         case messages.StatusChanged(status=status):
             return replace(picture, status=status)
-        case messages.QuestionOpened(question=question):
+        case messages.QuestionChanged(question=question):
             return replace(picture, question=question)
-        case messages.QuestionClosed():
-            return replace(picture, question=None)
         case messages.LiveSnapshot():
             return replace(picture, live=message, live_at_s=now_s)
         case messages.ControlChanged():

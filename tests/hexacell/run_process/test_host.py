@@ -15,8 +15,7 @@ from hexacell.run_process.messages import (
     EventRecorded,
     HostFailed,
     HostMessage,
-    QuestionClosed,
-    QuestionOpened,
+    QuestionChanged,
     RunDescribed,
     StatusChanged,
 )
@@ -83,7 +82,11 @@ def hosted(path: Path, cell: Cell) -> Hosted:
 
 
 def asks(kind: type) -> Callable[[HostMessage], bool]:
-    return lambda one: isinstance(one, QuestionOpened) and isinstance(one.question.subject, kind)
+    return lambda one: (
+        isinstance(one, QuestionChanged)
+        and one.question is not None
+        and isinstance(one.question.subject, kind)
+    )
 
 
 def is_status(status: Status) -> Callable[[HostMessage], bool]:
@@ -103,7 +106,7 @@ async def answer_all(client: Client) -> None:
     answers = {GaugePlacement: "placed", StepFailure: "abort"}
     async for message in client._messages:
         client.told.append(message)
-        if isinstance(message, QuestionOpened):
+        if isinstance(message, QuestionChanged) and message.question is not None:
             await client.connection.give(Answer(answers.get(type(message.question.subject), "a tester")))
 
 
@@ -125,7 +128,8 @@ async def test_a_whole_run_is_told_and_commanded_over_the_socket(hosted) -> None
     assert [one.sequence for one in client.told if isinstance(one, EventRecorded)] == [
         entry.number for entry in read_entries(run.folder.journal)
     ]
-    assert client.told.count(QuestionClosed()) == sum(isinstance(m, QuestionOpened) for m in client.told)
+    questions = [one.question for one in client.told if isinstance(one, QuestionChanged)]
+    assert 2 * questions.count(None) == len(questions)
     assert StatusChanged(status=Status.ENDED) in client.told
 
 

@@ -20,8 +20,7 @@ from hexacell.run_process.messages import (
     HostFailed,
     HostMessage,
     LiveSnapshot,
-    QuestionClosed,
-    QuestionOpened,
+    QuestionChanged,
     RunDescribed,
     StatusChanged,
     client_message,
@@ -98,7 +97,7 @@ def test_every_question_arrives_as_it_was_asked() -> None:
     @settings(SAME_EACH_TIME, max_examples=100)
     @given(valid(Question))
     def arrives(question: Question) -> None:
-        sent = QuestionOpened(question=question)
+        sent = QuestionChanged(question=question)
         subjects.add(type(question.subject))
         assert told(from_host(sent)) == told(sent)
 
@@ -120,7 +119,7 @@ def test_every_kind_has_a_word_of_its_own() -> None:
         ControlChanged(is_in_control=True, who="ada"),
         StatusChanged(status=Status.PAUSED),
         LiveSnapshot(gauges=(GaugeSnapshot(name="x", axis="x", shown_mm=-0.1, travel_mm=12.5),)),
-        QuestionClosed(),
+        QuestionChanged(question=None),
         CursorMoved(sequence=1, last=2, at=NOON, speed=0.5),
     ],
     ids=lambda sent: sent.kind,

@@ -15,8 +15,7 @@ from hexacell.run_process.messages import (
     CursorMoved,
     EventRecorded,
     HostMessage,
-    QuestionClosed,
-    QuestionOpened,
+    QuestionChanged,
     RunDescribed,
     StatusChanged,
 )
@@ -129,13 +128,15 @@ async def test_questions_to_place_gauges_are_told(tmp_path) -> None:
     run = RecordedRun(recorded(tmp_path), 2)
     messages = run.messages()
     asked = await told(messages)
-    [placement] = [one.question.subject for one in asked if isinstance(one, QuestionOpened)]
+    [placement] = [
+        one.question.subject for one in asked if isinstance(one, QuestionChanged) and one.question
+    ]
     assert isinstance(placement, GaugePlacement)
     assert (placement.station, placement.pose) == ("point 1", Pose(100.0, -100.0, 500.0))
     assert StatusChanged(status=Status.AWAITING_OPERATOR) in asked
     run.step()
     answered = await told(messages)
-    assert QuestionClosed() in answered
+    assert QuestionChanged(question=None) in answered
     assert StatusChanged(status=Status.RUNNING) in answered
 
 

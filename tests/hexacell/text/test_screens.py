@@ -14,7 +14,7 @@ from hexacell.run_process.messages import (
     HostFailed,
     HostMessage,
     LiveSnapshot,
-    QuestionOpened,
+    QuestionChanged,
     RunDescribed,
     Shown,
     StatusChanged,
@@ -125,7 +125,7 @@ def test_who_watches_is_told_who_is_in_control() -> None:
     assert guidance(picture, None)["Stop"] == "you only watch: grace is in control; c takes over"
     asked = picture_after(
         picture,
-        QuestionOpened(question=ask_placement(SetKey(phase=Phase.LENGTH, point=1), Pose(0.0, 0.0, 0.0))),
+        QuestionChanged(question=ask_placement(SetKey(phase=Phase.LENGTH, point=1), Pose(0.0, 0.0, 0.0))),
         0.0,
     )
     assert guidance(asked, None)["Now"] == "a question waits for who is in control"

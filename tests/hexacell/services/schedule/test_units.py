@@ -44,9 +44,7 @@ def words_of(line: str) -> list[str]:
 
 
 def test_a_night_is_a_check_once_and_what_may_pass_is_tried_again() -> None:
-    found = settings_of(
-        service_text(replace(scheduled(), on_failure="mail@%n.service"), "robot", ["dialout"])
-    )
+    found = settings_of(service_text(scheduled(), "robot", ["dialout"]))
     assert found["Type"] == "oneshot"
     assert words_of(found["ExecStart"])[3:] == [
         "run", "/cells/my-robot/cell.toml", "--unattended", "--mode", "check",
@@ -54,7 +52,7 @@ def test_a_night_is_a_check_once_and_what_may_pass_is_tried_again() -> None:
     assert found["RestartPreventExitStatus"].split() == ["1", "2", "4", "6", "7", "70", "130", "SIGTERM"]
     assert (found["StartLimitBurst"], found["StartLimitIntervalSec"]) == ("4", "540min")
     assert (found["User"], found["SupplementaryGroups"]) == ("robot", "dialout")
-    assert (found["OnFailure"], found["NoNewPrivileges"]) == ("mail@%n.service", "yes")
+    assert found["NoNewPrivileges"] == "yes"
     assert found["ReadWritePaths"] == '"/cells/my-robot"'
     timer = settings_of(timer_text(scheduled()))
     assert (timer["OnCalendar"], timer["Persistent"]) == ("*-*-* 02:30:00", "yes")
@@ -77,7 +75,7 @@ def test_a_cell_below_a_temporary_folder_is_not_hidden_from_its_run() -> None:
 
 def test_the_service_of_a_user_asks_for_nothing_that_only_root_may() -> None:
     found = settings_of(service_text(scheduled(retries=0), None, ["dialout"]))
-    assert not {"User", "ProtectSystem", "CapabilityBoundingSet", "OnFailure", "Restart"} & set(found)
+    assert not {"User", "ProtectSystem", "CapabilityBoundingSet", "Restart"} & set(found)
 
 
 @given(PRINTABLE, PRINTABLE)
@@ -110,7 +108,6 @@ def test_what_is_no_time_of_day_is_refused() -> None:
 @pytest.mark.parametrize("user", [None, "root"])
 def test_systemd_finds_nothing_wrong_with_them(tmp_path, user) -> None:
     run = scheduled(str(tmp_path / "a cell$ with %i" / "cell.toml"))
-    run = replace(run, on_failure="mail@%n.service")
     run.cell.parent.mkdir()
     units = {"service": service_text(run, user, []), "timer": timer_text(run)}
     for kind, text in units.items():

@@ -57,35 +57,24 @@ class PositionSignal:
         return f"encoder of leg {self.leg} ({self.name})"
 
 
-@dataclass(frozen=True, slots=True)
-class Database:
-    """The position signals of legs 1 to 6; ``errors`` is raised for frames that cannot be decoded."""
-
-    signals: tuple[PositionSignal, ...]
-    errors: type[Exception]
-
-    @property
-    def frames(self) -> frozenset[FrameId]:
-        """The frames that carry positions."""
-        return frozenset(signal.frame for signal in self.signals)
-
-
-def read_database(settings: DbcSettings, unit: JointUnit, step: float) -> Database:
+def read_signals(settings: DbcSettings, unit: JointUnit, step: float) -> tuple[PositionSignal, ...]:
     """The signals of legs 1 to 6; ``step`` is one count in the unit of the joint variables.
 
     Raises:
         UsageError: cantools is not installed.
         FileError: the file cannot be read, or lacks a message, a signal, a unit or a range.
     """
-    cantools = optional("cantools", "dbc", "encoders")
+    cantools = _cantools()
     try:
         found = cantools.database.load_file(settings.file)
     except (OSError, UnicodeDecodeError, cantools.Error) as error:
         raise FileError(f"cannot be read: {error}", subject=settings.file, action="Correct it") from error
-    signals = tuple(
-        _signal(found, settings, leg, name, unit, step) for leg, name in enumerate(settings.signals, 1)
-    )
-    return Database(signals, cantools.Error)
+    named = enumerate(settings.signals, 1)
+    return tuple(_signal(found, settings, leg, name, unit, step) for leg, name in named)
+
+
+def _cantools() -> Any:  # noqa: ANN401 - a module
+    return optional("cantools", "dbc", "encoders")
 
 
 def _signal(
@@ -152,8 +141,9 @@ class DbcSession(BankSession):
                 action="Add [encoders.dbc] with file and signals to the cell file",
             )
         self._described = described
-        self._database = read_database(described, settings.unit, settings.step)
-        super().__init__(settings, [signal.subject for signal in self._database.signals])
+        self._signals = read_signals(described, settings.unit, settings.step)
+        self._frames = {signal.frame for signal in self._signals}
+        super().__init__(settings, [signal.subject for signal in self._signals])
         self._latest: dict[int, _Received] = {}
         self.identities = tuple(
             DeviceIdentity(
@@ -162,13 +152,13 @@ class DbcSession(BankSession):
                 one.name,
                 settings=f"steps of {one.signal.scale:g} {one.signal.unit}, offset {one.signal.offset:g}",
             )
-            for one in self._database.signals
+            for one in self._signals
         )
         self._bus = EncoderBus(bus_settings(settings), closing, trace, self._accepts)
 
     def start(self) -> None:
         """Listen to all six, and take a first sample."""
-        for frame in self._database.frames:
+        for frame in self._frames:
             self._bus.network.subscribe(frame.number, self._receiver(frame))
         self._sample()
 
@@ -178,10 +168,10 @@ class DbcSession(BankSession):
 
     def _accepts(self, message: can.Message) -> bool:
         frame = FrameId(message.arbitration_id, message.is_extended_id)
-        return message.is_rx and not message.is_remote_frame and frame in self._database.frames
+        return message.is_rx and not message.is_remote_frame and frame in self._frames
 
     def _receiver(self, frame: FrameId) -> Callable[[int, bytearray, float], None]:
-        signals = [signal for signal in self._database.signals if signal.frame == frame]
+        signals = [signal for signal in self._signals if signal.frame == frame]
 
         def received(_can_id: int, data: bytearray, _timestamp: float) -> None:
             now = time.monotonic()
@@ -199,7 +189,7 @@ class DbcSession(BankSession):
             return _Received(now, 0.0, problem)
         try:
             values = signal.message.decode(data, decode_choices=False)
-        except self._database.errors as error:
+        except _cantools().Error as error:
             return _Received(now, 0.0, f"sends what the DBC file does not describe ({error})")
         if (value := values.get(signal.signal.name)) is None:
             return None
@@ -218,12 +208,11 @@ class DbcSession(BankSession):
         with self._bus.condition:
             latest = dict(self._latest)
         fresh = {leg: one for leg, one in latest.items() if one.at_s >= since_s}
-        signals = self._database.signals
-        for signal in signals:
+        for signal in self._signals:
             if signal.leg in fresh and fresh[signal.leg].problem:
                 action = "Remove the cause, or correct [encoders.dbc], then measure again"
                 raise invalid_sample(fresh[signal.leg].problem, signal.subject, action)
-        for signal in signals:
+        for signal in self._signals:
             if signal.leg not in fresh:
                 check = "its supply and cable, and the message in the DBC file"
                 raise silent_encoder(
@@ -237,7 +226,7 @@ class DbcSession(BankSession):
                 subject="encoders",
                 action="Let them send more often or on a request, or correct window_s in [encoders.dbc]",
             )
-        return tuple(round(latest[signal.leg].position / self._settings.step) for signal in signals)
+        return tuple(round(latest[signal.leg].position / self._settings.step) for signal in self._signals)
 
     def _ask(self) -> float:
         """Send the request, if there is one; the time from which on frames have later positions."""
@@ -254,7 +243,7 @@ class DbcSession(BankSession):
             return True
         times = [one.at_s for one in self._latest.values()]
         return (
-            len(times) == len(self._database.signals)
+            len(times) == len(self._signals)
             and min(times) >= since_s
             and max(times) - min(times) <= self._described.window_s
         )

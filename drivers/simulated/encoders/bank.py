@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from drivers.encoders.dbc import PositionSignal, read_database
+from drivers.encoders.dbc import PositionSignal, read_signals
 from drivers.simulated.encoders.can_bus import PeriodicAction, SimulatedCanBus
 from drivers.simulated.encoders.node import SimulatedEncoder
 from drivers.simulated.encoders.object_dictionary import EVENTS_AND_SYNC, ROTARY, DeviceData, Vendor
@@ -172,9 +172,8 @@ class SimulatedDbcBank(_CanBank):
 
     def __init__(self, settings: EncoderSettings, described: DbcSettings, positions: Positions) -> None:
         self._settings, self._positions = settings, positions
-        database = read_database(described, settings.unit, settings.step)
-        self._signals = database.signals
-        if len(database.frames) < len(self._signals):
+        self._signals = read_signals(described, settings.unit, settings.step)
+        if len({signal.frame for signal in self._signals}) < len(self._signals):
             raise FileError("legs share a message", subject=described.file, action="Give each leg its own")
         super().__init__()
         self._encoders = tuple(SimulatedDbcEncoder(one, described.must_be) for one in self._signals)

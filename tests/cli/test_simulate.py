@@ -11,9 +11,9 @@ CELL = "simulated-hexaglide.toml"
 CONTROLLER = "simulated-hexaglide.controller.toml"
 
 
-def serving(start, folder, *options):
+def serving(start, folder):
     """A cell that is being served, and the cell file that it printed."""
-    process = start("simulate", folder.cell, *options)
+    process = start("simulate", folder.cell)
     process.wait_for("serving", lambda: process.err)
     return process, process.out
 
@@ -40,10 +40,11 @@ def test_simulate_prints_a_complete_cell_file_without_the_true_geometry(served_c
 
 
 def test_a_signal_ends_simulate_without_leftovers(start, cell_folder, typed_here):
-    faults = ("--fault", "in inches:x", "--fault", "jumped:encoder 2@900")
+    with cell_folder.cell.open("a") as file:
+        file.write('\n[[simulation.faults]]\nkind = "in inches"\ndevice = "x"\n')
     (cell_folder.path / "taught.toml").write_bytes(cell_folder.controller.read_bytes())
     cell_folder.edit(('# taught = "robot-taught.toml"', 'taught = "taught.toml"'))
-    process, text = serving(start, cell_folder, *faults)
+    process, text = serving(start, cell_folder)
     served = cell_folder.path.parent / "served.toml"
     served.write_text(text)
     assert tomllib.loads(text)["controller"]["taught"] == str((cell_folder.path / "taught.toml").resolve())
@@ -77,18 +78,6 @@ def test_simulate_ends_while_a_run_is_connected(served, start):
 
 def names_below(folder: Path) -> set[str]:
     return {path.stem for path in folder.rglob("*")}
-
-
-def test_faults_that_cannot_be_simulated_are_refused(cell_folder, typed_here):
-    wrong = {
-        "slow:x": "--fault slow:x is no fault that can be simulated. Write it like damaged:x@12",
-        "damaged:x@soon": "--fault damaged:x@soon is no fault",
-        "damaged:w": "no fault 'damaged' can be simulated of 'w'. Name one of x, y, z",
-        "damaged": "no fault 'damaged' can be simulated of ''. Name one of x, y, z",
-    }
-    for fault, words in wrong.items():
-        outcome = typed_here("simulate", cell_folder.cell, "--fault", fault)
-        assert (outcome.code, words in " ".join(outcome.err.split())) == (2, True)
 
 
 def test_the_files_of_the_cell_itself_are_not_written_over(cell_folder, typed_here):

@@ -32,7 +32,6 @@ def _devices(commands: Any) -> None:  # noqa: ANN401
     parser.add_argument("ports", nargs="*", metavar="PORT", help=words)
     words = "a CAN bus, such as interface=slcan,channel=/dev/ttyACM0,bitrate=500000"
     parser.add_argument("--can", action="append", default=[], metavar="BUS", help=words)
-    add_value(parser, "--bitrate", "BIT/S", "of CAN adapters that are found", int, 500_000)
     add_value(
         parser, "--controller", "HOST:PORT", "where LinuxCNC's server may be", default="127.0.0.1:5007"
     )

@@ -83,8 +83,6 @@ def _simulate(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(commands, "simulate", summary, "serve.simulate")
     parser.add_cell()
     add_file(parser, "--output", "write the cell file for `run` there instead of to stdout")
-    words = 'inject a fault, such as "damaged:x@12": of gauge x, with move 12; without @12 at once'
-    parser.add_argument("--fault", action="append", default=[], metavar="KIND:DEVICE@MOVE", help=words)
 
 
 def _host(commands: Any) -> None:  # noqa: ANN401

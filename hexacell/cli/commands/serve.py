@@ -12,7 +12,7 @@ from hexacell.cli.commands.cell import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
 from hexacell.services.preflight import is_loopback
-from hexacell.services.run.demo import served_cell, with_faults
+from hexacell.services.run.demo import require_simulation, served_cell
 from hexacell.storage.atomic_files import write_atomically
 
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -44,7 +44,7 @@ async def _serve_results(
 
 def simulate(options: argparse.Namespace, console: Console) -> ExitCode:
     """Serve until interrupted; stdout gets a cell file with the addresses of the served devices."""
-    cell = with_faults(cell_at(options.cell, console), options.fault)
+    cell = require_simulation(cell_at(options.cell, console))
     if options.output is not None:
         own = {path.resolve() for path in (cell.path, *cell.config_paths)}
         if options.output.resolve() in own:

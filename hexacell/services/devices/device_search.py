@@ -21,7 +21,7 @@ from drivers.discovery.gauges import FoundGauge, PortFindings, probe_of, search_
 from drivers.serial.opening import SerialPortFound, serial_ports
 from hexacell.kinematics.parameters import LEGS, JointUnit
 from hexacell.plugins import Group, load, names
-from hexacell.services.devices.first_cell import GAUGE_AXES, CellDraft, Document
+from hexacell.services.devices.first_cell import BITRATE, GAUGE_AXES, CellDraft, Document
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,6 @@ class SearchFindings:
 async def search_devices(
     named_ports: Sequence[str],
     named_buses: Sequence[dict[str, Any]],
-    bitrate: int,
     controller: tuple[str, int],
     timeouts: SearchTimeouts = USUAL,
 ) -> SearchFindings:
@@ -52,7 +51,6 @@ async def search_devices(
     Args:
         named_ports: serial ports or pyserial URLs; all of this computer if there are none.
         named_buses: settings of CAN buses beside those that are found.
-        bitrate: of the buses that are found, bit/s.
         controller: host and port.
         timeouts: longest waits.
     """
@@ -68,7 +66,7 @@ async def search_devices(
     slcan = [port for port, answers in zip(silent, adapters, strict=True) if answers]
     buses: list[dict[str, Any]] = [
         *({"interface": "socketcan", "channel": name} for name in socketcan_interfaces()),
-        *({"interface": "slcan", "channel": port, "bitrate": bitrate} for port in slcan),
+        *({"interface": "slcan", "channel": port, "bitrate": BITRATE} for port in slcan),
         *named_buses,
     ]
     searched = await asyncio.gather(*(asyncio.to_thread(search_bus, bus, timeouts) for bus in buses))

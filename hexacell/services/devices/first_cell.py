@@ -27,6 +27,8 @@ HEADER = "# Made from a few answers. `hexacell cell show` prints it with every d
 KEPT_SECTIONS = ("robot", "limits", "speed")
 """Sections of the simulated cell in which every answer has a place, and limits are stated with care."""
 GAUGE_AXES = "xyz"
+BITRATE = 500_000
+"""Of a CAN bus whose rate nobody states, bit/s."""
 POINT_OFFSETS = (
     (0.0, 0.0, 0.0),
     (0.0, -1.0, 0.0),
@@ -116,7 +118,7 @@ def _put_bus(document: Document, given: str) -> None:
     interface, channel, *bitrate = given.split() if len(given.split()) > 1 else (given, "")
     if not channel or len(bitrate) > 1:
         raise ValueError("name the interface and the channel, such as: socketcan can0")
-    rate = _whole(bitrate[0]) if bitrate else 500_000
+    rate = _whole(bitrate[0]) if bitrate else BITRATE
     document["encoders"]["bus"] = {"interface": interface, "channel": channel, "bitrate": rate}
 
 

@@ -1,17 +1,14 @@
 """Simulated cells: served to other processes, and calibrated as a demo in a folder of its own."""
 
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import replace
 from pathlib import Path
-from typing import get_args
 
 from hexacell.cell.bundled import CONTROLLER, bundled_config
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.passwords import password_path
 from hexacell.cell.robot import FurtherFileSettings
-from hexacell.cell.simulation import FaultKind, SimulatedFault
 from hexacell.errors import FileError, UsageError
 from hexacell.runs.cell_lock import cell_lock, lock_path
 from hexacell.runs.run_folder import RunFolder, runs_folder
@@ -37,34 +34,6 @@ def require_simulation(cell: Cell) -> Cell:
     if cell.settings.simulation is None:
         raise UsageError("there is no [simulation] in it: this is a real cell", subject=cell.path)
     return cell
-
-
-def with_faults(cell: Cell, faults: Sequence[str]) -> Cell:
-    """A simulated cell with more faults, each as ``KIND:DEVICE@MOVE``; see :class:`SimulatedFault`.
-
-    Raises:
-        UsageError: one cannot be read, or names an unknown kind; or it is a real cell.
-    """
-    simulation = require_simulation(cell).settings.simulation
-    if simulation is None or not faults:
-        return cell
-    more = {"faults": (*simulation.faults, *(_fault(words) for words in faults))}
-    changed = {"simulation": simulation.model_copy(update=more)}
-    return replace(cell, settings=cell.settings.model_copy(update=changed))
-
-
-def _fault(words: str) -> SimulatedFault:
-    what, at, move = words.partition("@")
-    kind, _, device = what.partition(":")
-    stated = {"kind": kind.strip(), "device": device.strip(), **({"at_move": move} if at else {})}
-    try:
-        return SimulatedFault.model_validate(stated)
-    except ValueError as error:
-        kinds = ", ".join(get_args(FaultKind))
-        raise UsageError(
-            f"--fault {words} is no fault that can be simulated",
-            action=f"Write it like damaged:x@12; kinds are {kinds}",
-        ) from error
 
 
 @contextmanager

@@ -57,13 +57,6 @@ def test_a_service_that_could_not_begin_is_not_written(schedule, units, tmp_path
     assert not units.exists()
 
 
-def test_for_cron_a_line_is_printed_and_nothing_written(schedule, cell_folder, units) -> None:
-    outcome = schedule("--daily", "02:30", "--cron")
-    assert outcome.out.splitlines()[-1].startswith("30 2 * * * cd ")
-    assert str(cell_folder.cell) in outcome.out
-    assert not units.exists()
-
-
 def test_a_service_leaves_a_run_the_time_that_the_cell_file_gives_it(schedule, cell_folder, units) -> None:
     given = '[unattended]\nquiet_hours = ["09:00-10:00"]\n'
     cell_folder.cell.write_text(f"{cell_folder.cell.read_text()}\n{given}")

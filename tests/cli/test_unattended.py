@@ -104,6 +104,3 @@ def test_a_schedule_leaves_the_run_its_window(typed_here, short_cell, tmp_path) 
     refused = typed_here("schedule", short_cell.cell, "--daily", "05:30", "--folder", units)
     assert refused.code == ExitCode.USAGE
     assert "05:30 is in the quiet hours of the cell" in refused.err
-    line = typed_here("schedule", short_cell.cell, "--daily", "02:30", "--cron")
-    assert "timeout --signal=TERM --kill-after=120 180m" in line.out
-    assert "the run tries again in its window" in line.out

@@ -45,7 +45,7 @@ def _devices(commands: Any) -> None:  # noqa: ANN401
 
 
 def _schedule(commands: Any) -> None:  # noqa: ANN401
-    summary = "have a cell checked each day: systemd units or a crontab line"
+    summary = "have a cell checked each day, by units of systemd"
     parser = add_command(commands, "schedule", summary, "unattended.schedule")
     parser.add_cell()
     what = parser.add_mutually_exclusive_group()
@@ -60,7 +60,6 @@ def _schedule(commands: Any) -> None:  # noqa: ANN401
         "and apply only within the limits",
     )
     add_file(parser, "--metrics", "write metrics of the cell there after each run")
-    add_flag(parser, "--cron", "print a crontab line instead")
     add_value(parser, "--folder", "FOLDER", "where the units are, if elsewhere", Path)
     parser.add_json()
 

@@ -27,7 +27,7 @@ from hexacell.services.unattended.outbox import (
     send_waiting,
     waiting_notices,
 )
-from hexacell.services.unattended.scheduled_run import ScheduledRun, crontab_line
+from hexacell.services.unattended.scheduled_run import ScheduledRun
 from hexacell.services.unattended.schedules import (
     Schedule,
     present_schedule,
@@ -127,21 +127,12 @@ def schedule(options: argparse.Namespace, console: Console) -> ExitCode:
     elif options.daily is None:
         raise UsageError("the time of day is missing", action="Give --daily 02:30, --show or --remove")
     else:
-        _write(cell, options, console)
+        run = scheduled_run(cell, options.daily, options.mode, options.metrics)
+        written = write_schedule(run, options.folder)
+        console.show(
+            _schedule_document(written), written_schedule_text(written, run, cell.settings.unattended)
+        )
     return ExitCode.DONE
-
-
-def _write(cell: Cell, options: argparse.Namespace, console: Console) -> None:
-    run = scheduled_run(cell, options.daily, options.mode, options.metrics)
-    stated = cell.settings.unattended
-    if options.cron:
-        line = crontab_line(run)
-        tries = "the run tries again in its window" if stated.window_minutes else "cron does not try again"
-        text = f"Put this line into `crontab -e`; {tries}, and cron mails what is said:\n{line}"
-        console.show({"crontab": line}, text)
-        return
-    written = write_schedule(run, options.folder)
-    console.show(_schedule_document(written), written_schedule_text(written, run, stated))
 
 
 def _schedule_document(schedule: Schedule | None) -> dict[str, Any]:

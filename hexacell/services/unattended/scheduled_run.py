@@ -1,11 +1,10 @@
-"""What a scheduler is to start, and when: as units of systemd, or as a line of a crontab.
+"""What a scheduler is to start, and when, as units of systemd.
 
 The service runs once, and a timer starts it. Sources: systemd.service(5), systemd.exec(5),
-systemd.timer(5), systemd.syntax(7), crontab(5).
+systemd.timer(5), systemd.syntax(7).
 """
 
 import re
-import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -78,15 +77,6 @@ def time_of_day(text: str) -> tuple[int, int]:
     if found is None:
         raise UsageError(f"'{text}' is no time of day", action="Write it as 02:30")
     return int(found[1]), int(found[2])
-
-
-def crontab_line(run: ScheduledRun) -> str:
-    """The line. Cron takes % for a line's end, has no retries, and mails what is printed."""
-    longest = ("timeout", "--signal=TERM", f"--kill-after={STOPPING_S}", f"{run.longest_minutes}m")
-    begun = f"cd {shlex.quote(str(run.cell.parent))} && {shlex.join([*longest, *run.words])} </dev/null"
-    command = f"{begun}; {shlex.join(run.words_afterwards)}" if run.metrics else begun
-    escaped = command.replace("%", "\\%")
-    return f"{run.minute} {run.hour} * * * {escaped}"
 
 
 MARK = "# Written by `hexacell schedule` for "

@@ -1,4 +1,4 @@
-"""Units and crontab lines: what they start is what was meant, whatever signs are in a path."""
+"""Units of systemd: what they start is what was meant, whatever signs are in a path."""
 
 import shlex
 import shutil
@@ -14,7 +14,6 @@ from hexacell.errors import UsageError
 from hexacell.services.unattended.scheduled_run import (
     ScheduledRun,
     cell_of,
-    crontab_line,
     service_text,
     time_of_day,
     timer_text,
@@ -64,7 +63,6 @@ def test_metrics_are_written_after_each_run_whatever_came_of_it() -> None:
     assert words_of(found["ExecStopPost"])[3:] == [
         "status", "/cells/my-robot/cell.toml", "--metrics", "/metrics/a b.prom",
     ]  # fmt: skip
-    assert crontab_line(run).endswith("; " + shlex.join(run.words_afterwards))
     assert "ExecStopPost" not in service_text(scheduled(), "robot", [])
 
 
@@ -85,17 +83,6 @@ def test_any_path_is_one_argument(folder, file) -> None:
     assert words_of(found["ExecStart"]) == list(run.words)
     assert found["WorkingDirectory"].replace("%%", "%") == str(run.cell.parent)
     assert cell_of(service_text(run, None, [])) == cell_of(timer_text(run)) == run.cell
-
-
-@given(PRINTABLE)
-def test_any_path_is_one_word_of_a_crontab(file) -> None:
-    run = scheduled(f"/cells/{file}")
-    schedule, command = crontab_line(run).split(" * * * ", 1)
-    assert schedule == "30 2"
-    assert "%" not in command.replace("\\%", "")
-    assert shlex.split(command.replace("\\%", "%").removesuffix(" </dev/null"))[-len(run.words) :] == list(
-        run.words
-    )
 
 
 def test_what_is_no_time_of_day_is_refused() -> None:

@@ -54,28 +54,6 @@ class Mode(StrEnum):
     LENGTH = "length"
 
 
-@dataclass(frozen=True, slots=True)
-class Learnt:
-    """What a run has learnt and done so far, as far as the choice of steps depends on it.
-
-    Attributes:
-        refused: what the cell file excludes and the controller refused.
-        noise: what was measured of it; None before that, or where the cell file does not ask for it.
-        provisional: parameters of the geometry that the controller was given for a while, in the
-            mechanism's frame convention; ``is_lent``: it has it now.
-        written: parameters of the proposed geometry, in the controller's frames, with the ``corrections``
-            that are proposed beside it; ``is_committed``: the controller has it.
-    """
-
-    refused: RefusedCommands
-    noise: MeasuredNoise | None = None
-    provisional: tuple[float, ...] | None = None
-    is_lent: bool = False
-    written: tuple[float, ...] | None = None
-    corrections: Corrections | None = None
-    is_committed: bool = False
-
-
 @dataclass(frozen=True, eq=False)
 class Calibration:
     """The calibration or check of one cell.
@@ -103,24 +81,22 @@ class Calibration:
         """What is known of the robot in a state of the run; one object as long as nothing new is learnt."""
         vector, lent, proposed = self.robot.mechanism.parameters.vector, state.provisional, state.proposed
         return self._knowledge(
-            Learnt(
-                self.robot.refused | state.refused,
-                None if state.noise is None else state.noise.noise,
-                None if lent is None else tuple(vector(lent.geometry).tolist()),
-                state.provisional_active,
-                None if proposed is None else tuple(vector(proposed.written).tolist()),
-                None if proposed is None else proposed.corrections,
-                state.committed is not None,
-            )
+            self.robot.refused | state.refused,
+            None if state.noise is None else state.noise.noise,
+            None if lent is None else tuple(vector(lent.geometry).tolist()),
+            state.provisional_active,
+            None if proposed is None else tuple(vector(proposed.written).tolist()),
+            None if proposed is None else proposed.corrections,
+            state.committed is not None,
         )
 
     @cached_property
     def at_start(self) -> Knowledge:
         """What is known before anything is measured."""
-        return Knowledge(self, Learnt(self.robot.refused))
+        return Knowledge(self, self.robot.refused)
 
     @cached_property
-    def _knowledge(self) -> Callable[[Learnt], Knowledge]:
+    def _knowledge(self) -> Callable[..., Knowledge]:
         # What was searched and estimated for a step serves the next one; a run returns to what it knew when
         # a provisional geometry is taken back.
         return lru_cache(maxsize=4)(partial(Knowledge, self))
@@ -156,22 +132,37 @@ class Calibration:
 
 @dataclass(frozen=True, eq=False)
 class Knowledge:
-    """A calibration with what its run has learnt so far."""
+    """A calibration with what its run has learnt and done so far.
+
+    Attributes:
+        refused: what the cell file excludes and the controller refused.
+        noise: what was measured of it; None before that, or where the cell file does not ask for it.
+        provisional: parameters of the geometry that the controller was given for a while, in the
+            mechanism's frame convention; ``is_lent``: it has it now.
+        written: parameters of the proposed geometry, in the controller's frames, with the ``corrections``
+            that are proposed beside it; ``is_committed``: the controller has it.
+    """
 
     calibration: Calibration
-    learnt: Learnt
+    refused: RefusedCommands
+    noise: MeasuredNoise | None = None
+    provisional: tuple[float, ...] | None = None
+    is_lent: bool = False
+    written: tuple[float, ...] | None = None
+    corrections: Corrections | None = None
+    is_committed: bool = False
 
     @cached_property
     def settings(self) -> CellSettings:
         """What the cell file states, with the measured noise."""
-        settings, noise = self.calibration.settings, self.learnt.noise
+        settings, noise = self.calibration.settings, self.noise
         return settings if noise is None else with_measured_noise(settings, noise)
 
     @cached_property
     def robot(self) -> Robot:
         """The robot as its controller commanded it at the start, with the measured noise."""
-        robot = replace(self.calibration.robot, refused=self.learnt.refused)
-        return robot if self.learnt.noise is None else robot.with_errors_of(self.settings)
+        robot = replace(self.calibration.robot, refused=self.refused)
+        return robot if self.noise is None else robot.with_errors_of(self.settings)
 
     @cached_property
     def plan(self) -> Plan:
@@ -188,22 +179,22 @@ class Knowledge:
     @cached_property
     def identifying(self) -> Plan:
         """The plan for the geometries that the controller has while the points are measured."""
-        if (lent := self.learnt.provisional) is None:
+        if (lent := self.provisional) is None:
             return self.plan
         geometry = Geometry(self.robot.mechanism.parameters, lent)
-        return self._plan_of(self.robot.with_provisional(geometry, is_used=self.learnt.is_lent))
+        return self._plan_of(self.robot.with_provisional(geometry, is_used=self.is_lent))
 
     @cached_property
     def measuring(self) -> Plan:
         """The plan for the geometry that the controller has now, and for those that it had."""
-        if not self.learnt.is_committed:
+        if not self.is_committed:
             return self.identifying
-        return self._plan_of(self.robot.with_controller(self._written, self.learnt.corrections))
+        return self._plan_of(self.robot.with_controller(self._written, self.corrections))
 
     @cached_property
     def allowances(self) -> Allowances:
         """What may be off at a stop, and back at a reference."""
-        return Allowances(self.calibration.settings, self.measuring.robot, self.learnt.noise is not None)
+        return Allowances(self.calibration.settings, self.measuring.robot, self.noise is not None)
 
     @cached_property
     def check(self) -> Check:
@@ -237,7 +228,7 @@ class Knowledge:
 
     def written_robot(self, state: RunState) -> Robot:
         """The robot with the proposed geometry in its controller."""
-        return self._measured(self.robot.with_controller(self._written, self.learnt.corrections), state)
+        return self._measured(self.robot.with_controller(self._written, self.corrections), state)
 
     def _measured(self, robot: Robot, state: RunState) -> Robot:
         """The robot with the noise that all repeats show, by the geometry that the records show.
@@ -258,7 +249,7 @@ class Knowledge:
 
         They show it by the geometry that was ``found``, or by the one known before.
         """
-        noise, settings = self.learnt.noise, self.settings
+        noise, settings = self.noise, self.settings
         if noise is not None and found is not None:
             noise = noise_again(self.calibration.plan, state, found) or noise
             settings = with_measured_noise(self.calibration.settings, noise)
@@ -281,8 +272,8 @@ class Knowledge:
 
     @property
     def _written(self) -> Geometry:
-        assert self.learnt.written is not None  # noqa: S101 - only then there is a proposal
-        return Geometry(self.robot.mechanism.parameters, self.learnt.written)
+        assert self.written is not None  # noqa: S101 - only then there is a proposal
+        return Geometry(self.robot.mechanism.parameters, self.written)
 
     def _plan_of(self, robot: Robot) -> Plan:
         calibration = self.calibration

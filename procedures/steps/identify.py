@@ -55,7 +55,7 @@ class Identify(Computation):
         known = run.calibration.known(state)
         robot = known.robot_of(state)
         identified = identify(robot.problem(measurements))
-        assessed = assess(known.settings, robot, measurements, identified, known.learnt.noise)
+        assessed = assess(known.settings, robot, measurements, identified, known.noise)
         run.folder.write_result(fit_document(assessed))
         held_out = _held_out_poses(known, assessed)
         is_quick = run.calibration.mode == "quick"

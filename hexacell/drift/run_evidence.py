@@ -83,10 +83,6 @@ class RunEvidence:
         """Gradient (s,) of the log-likelihood at a state (s,)."""
         return self.weighted - self.information @ state
 
-    def __add__(self, other: RunEvidence) -> RunEvidence:
-        """The evidence of both together."""
-        return RunEvidence(self.information + other.information, self.weighted + other.weighted)
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WhitenedRecords:
@@ -155,34 +151,32 @@ def _whitened(causes: Array, values: Array) -> Array:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CarriedPosterior:
+class CarriedPosterior(RunEvidence):
     """The evidence of all runs so far, with the prior."""
-
-    evidence: RunEvidence
 
     @classmethod
     def diffuse(cls, free: int, causes: int) -> CarriedPosterior:
         """Nothing known of so many free parameters; shared causes have unit variance."""
         precision = np.diag([DIFFUSE**-2] * free + [1.0] * causes)
-        return cls(RunEvidence(precision, np.zeros(free + causes)))
+        return cls(precision, np.zeros(free + causes))
 
     @property
     def state(self) -> Array:
         """The estimate (s,)."""
-        found: Array = np.linalg.solve(self.evidence.information, self.evidence.weighted)
+        found: Array = np.linalg.solve(self.information, self.weighted)
         return found
 
     def after(self, *runs: RunEvidence) -> CarriedPosterior:
         """The posterior with some more runs."""
-        return CarriedPosterior(sum(runs, self.evidence))
+        information = sum((run.information for run in runs), self.information)
+        return CarriedPosterior(information, sum((run.weighted for run in runs), self.weighted))
 
     def scores(self, run: RunEvidence, causes: Array) -> Array:
         """Innovations (m,) of a run by each cause (m, s); NaN where it says nothing of a change.
 
         They are standard normal, and independent of all before, if the robot has not changed.
         """
-        information = self.evidence.information
-        share = np.linalg.solve(information + run.information, information).T
+        share = np.linalg.solve(self.information + run.information, self.information).T
         score = causes @ (share @ run.gradient(self.state))
         variance = np.einsum("ms,st,mt->m", causes, share @ run.information, causes)
         own = np.einsum("ms,st,mt->m", causes, run.information, causes)
@@ -191,13 +185,13 @@ class CarriedPosterior:
 
     def forgetting(self, causes: Array) -> CarriedPosterior:
         """The posterior if the robot may just have changed by any amount along some causes (m, s)."""
-        information, weighted = self.evidence.information, self.evidence.weighted
+        information, weighted = self.information, self.weighted
         for cause in causes:
             along = information @ cause
             taken = along / (DIFFUSE**-2 + float(cause @ along))
             weighted = weighted - taken * float(cause @ weighted)
             information = information - np.outer(taken, along)
-        return CarriedPosterior(RunEvidence(information, weighted))
+        return CarriedPosterior(information, weighted)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -230,7 +224,7 @@ class StepGains:
 def step_gains(before: CarriedPosterior, runs: Sequence[RunEvidence], causes: Array) -> StepGains:
     """The steps before each of n runs, by each of m causes (m, s); ``before`` is known before the first."""
     total = before.after(*runs)
-    state, covariance = total.state, np.linalg.inv(total.evidence.information)
+    state, covariance = total.state, np.linalg.inv(total.information)
     gradient, information = np.zeros(len(state)), np.zeros_like(covariance)
     scores, weights = np.zeros((len(runs), len(causes))), np.zeros((len(runs), len(causes)))
     for place in reversed(range(len(runs))):

@@ -80,7 +80,7 @@ def one_sigma(before: int, cause: int) -> Array:
     posterior = CarriedPosterior.diffuse(one.causes.free, 0)
     for information in [one.calibration] + [one.night] * before:
         posterior = posterior.after(RunEvidence(information, np.zeros(len(information))))
-    total = posterior.evidence.information
+    total = posterior.information
     direction = one.causes.by_state[cause]
     share = np.linalg.solve(total + one.night, total).T
     step: Array = direction / np.sqrt(direction @ share @ one.night @ direction)

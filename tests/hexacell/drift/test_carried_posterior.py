@@ -45,12 +45,10 @@ def test_forgetting_a_cause_is_a_wide_prior_along_it() -> None:
     posterior = CarriedPosterior.diffuse(6, 0).after(next(LinearRobot().runs(0)))
     cause = np.array([1.0, 0.5, 0.0, 0.0, -1.0, 0.0])
     forgot = posterior.forgetting(cause[None])
-    covariance = np.linalg.inv(posterior.evidence.information)
+    covariance = np.linalg.inv(posterior.information)
     np.testing.assert_allclose(forgot.state, posterior.state, atol=1e-6)
     np.testing.assert_allclose(
-        np.linalg.inv(forgot.evidence.information),
-        covariance + DIFFUSE**2 * np.outer(cause, cause),
-        rtol=1e-6,
+        np.linalg.inv(forgot.information), covariance + DIFFUSE**2 * np.outer(cause, cause), rtol=1e-6
     )
 
 

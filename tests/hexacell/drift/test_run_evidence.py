@@ -43,7 +43,7 @@ def test_errors_of_one_run_count_as_noise_and_shared_ones_as_state(identified) -
     alone = whiten_records(identified.problem, free, of_this_run=constant_along_x).evidence
     shared = whiten_records(replace(identified.problem, systematic=constant_along_x), free).evidence
     assert shared.information.shape == (36, 36)
-    prior = CarriedPosterior.diffuse(35, 1).evidence.information
+    prior = CarriedPosterior.diffuse(35, 1).information
     marginal = np.linalg.inv(np.linalg.inv(shared.information + prior)[:35, :35])
     np.testing.assert_allclose(marginal, alone.information + prior[:35, :35], rtol=1e-6)
 

@@ -77,7 +77,7 @@ def test_size_and_sigma_are_those_of_a_fit_with_the_step() -> None:
     runs += robot.nights(7)
     gains = step_gains(DIFFUSE, runs, CAUSES.by_state)
     normal, weighted = np.zeros((7, 7)), np.zeros(7)
-    normal[:6, :6] += DIFFUSE.evidence.information
+    normal[:6, :6] += DIFFUSE.information
     for place, run in enumerate(runs):
         to_state = np.column_stack([np.eye(6), CAUSES.by_state[2] if place >= 10 else np.zeros(6)])
         normal += to_state.T @ run.information @ to_state

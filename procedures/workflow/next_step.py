@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from hexacell.campaign.planner import Plan
 from hexacell.errors import HexacellError
 from hexacell.kinematics.pose import Pose
+from hexacell.motion.arrival import least_way
+from hexacell.motion.overshoot import clear_waypoint_before, overshoot
 from hexacell.noise.allowances import Allowances
 from hexacell.verdict.decision import Verdict
 from procedures.calibration.calibration import Calibration, Mode
@@ -26,7 +28,6 @@ from procedures.steps.move import Move
 from procedures.steps.propose import Propose
 from procedures.steps.roll_back import RollBack
 from procedures.steps.take_back import TakeBack
-from procedures.workflow.approach import Approach
 from procedures.workflow.held_out import HeldOutSteps
 from procedures.workflow.length import LengthSteps
 from procedures.workflow.points import IdentificationSteps, NoiseSteps
@@ -58,7 +59,7 @@ def next_step(calibration: Calibration, state: RunState) -> BaseStep | None:
     known = calibration.known(state)
     measuring = Measuring(known.measuring, known.allowances)
     step = _decided(calibration, measuring, state)
-    return measuring.approach.of_move(step, state) if isinstance(step, Move) else step
+    return measuring.from_one_side(step, state) if isinstance(step, Move) else step
 
 
 def _decided(calibration: Calibration, measuring: "Measuring", state: RunState) -> BaseStep | None:
@@ -77,20 +78,41 @@ def _decided(calibration: Calibration, measuring: "Measuring", state: RunState) 
 
 
 class Measuring:
-    """The stages that measure, for the geometries that command the robot of a plan."""
+    """The stages that measure, for the geometries that command the robot of a plan.
+
+    Where the cell file wants every stop reached from the same side, joints go from a waypoint to it by
+    ``_back``, in their unit, below 0 if they go down; 0 for moves as they are.
+    """
 
     def __init__(self, plan: Plan, allowances: Allowances) -> None:
         settings = plan.settings
         sets = SetSteps(plan.robot, settings.stations.trial_mm, allowances)
         self.points = IdentificationSteps(plan, sets, NoiseSteps(plan, sets))
         self.held_out = HeldOutSteps(len(settings.verification.points), sets)
-        self.approach = Approach.of(settings, sets, allowances.stops)
+        least = least_way(settings.mechanism.words.joint_unit, allowances.stops)
+        self._sets, self._back = sets, settings.motion.sign * overshoot(least, settings.model.backlash)
         fixture = settings.length_check
         self.length = None if fixture is None else LengthSteps(fixture, sets)
 
     def length_step(self, state: RunState) -> BaseStep | None:
         """The next step of the length check; None when it is done."""
         return None if self.length is None else self.length.next_step(state)
+
+    def from_one_side(self, move: Move, state: RunState) -> Move:
+        """The move over its waypoint, which is checked as the move itself is, or straight without one.
+
+        From which side the joints then arrived is known from the path.
+        """
+        if not self._back:
+            return move
+        belief, reference = self._sets.known(state, move.at)
+        start = None if state.target is None else self._sets.command(state.target)
+        stop = self._sets.command(move.pose)
+        waypoint = clear_waypoint_before(belief, start, stop, self._back, reference)
+        if waypoint is None:
+            return move.model_copy(update={"straight": True})
+        pose = self._sets.robot.to_command(waypoint.pose(0)).as_tuple()
+        return move.model_copy(update={"waypoint": pose})
 
 
 def length_poses(calibration: Calibration) -> tuple[tuple[str, Pose], ...]:

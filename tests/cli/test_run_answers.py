@@ -11,7 +11,11 @@ from tests.cli.cell_folder import ASK, BY_HAND
 from tests.cli.terminal import ended, start_at
 
 PLACED = "Press Enter when they are in place, or type a to abort: "
-FAST = (("clock_factor = 150.0", "clock_factor = 600.0"), ("give_up_s = 60.0", "give_up_s = 6000.0"))
+FAST = (
+    ("clock_factor = 150.0", "clock_factor = 600.0"),
+    ("give_up_s = 60.0", "give_up_s = 6000.0"),
+    ("encoder_mm = 0.01\ngauge_mm = 0.01", "encoder_mm = 0.014\ngauge_mm = 0.014"),
+)
 
 
 @pytest.fixture

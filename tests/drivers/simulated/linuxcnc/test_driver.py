@@ -45,21 +45,6 @@ async def test_a_stop_that_overtakes_its_move(ready, machine):
         await moving
 
 
-async def test_stopping_while_homing(driver, machine):
-    machine.duration_s = LONG_S
-    controller = driver()
-    await controller.open()
-    preparing = asyncio.create_task(controller.prepare(ALL))
-    await asyncio.to_thread(machine.wait_for, "home")
-    await controller.stop()
-    with pytest.raises(MotionInterrupted, match="was stopped before it was ready"):
-        await preparing
-    machine.duration_s = 0.01
-    await controller.prepare(ALL)
-    await controller.move(TARGET, MOVE_S)
-    await controller.close()
-
-
 async def test_an_unreachable_pose_while_another_client_waits_for_no_completion(ready, simulated):
     """``set_wait received`` is global in 2.9: NAK becomes ACK, and only the position tells."""
     simulated.state.waits = False

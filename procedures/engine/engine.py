@@ -4,18 +4,12 @@ import asyncio
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
+from hexacell.cell.recovery import Escalations
 from hexacell.errors import ExitCode, HexacellError, Interruption, OutOfTime
 from hexacell.verdict.decision import Verdict
 from procedures.engine.command_loop import CommandLoop, Status, StepCancelled
 from procedures.engine.commands import Command, CommandQueue, QuestionBroker, UnattendedOperator
-from procedures.engine.recovery import (
-    GIVE_UP,
-    Recovery,
-    RecoveryPolicy,
-    Reversal,
-    revert_at_end,
-    revert_unrecorded,
-)
+from procedures.engine.recovery import GIVE_UP, Recovery, Reversal, revert_at_end, revert_unrecorded
 from procedures.journal.journal import Journal
 from procedures.run.cancellation import shielded
 from procedures.run.keys import Phase
@@ -52,7 +46,7 @@ class Engine:
         *,
         queue: CommandQueue | None = None,
         broker: QuestionBroker | None = None,
-        policy: RecoveryPolicy = GIVE_UP,
+        policy: Escalations = GIVE_UP,
     ) -> None:
         self._executor = executor
         self._journal = journal

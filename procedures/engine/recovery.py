@@ -7,10 +7,10 @@ the cell file). Each attempt is an event, so the state of a run knows which acti
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from drivers import errors as device
-from hexacell.cell.recovery import Action, Escalations, FailureKind, RecoverySettings
+from hexacell.cell.recovery import Action, Escalations, FailureKind
 from hexacell.errors import (
     AnswerNeeded,
     DeviceError,
@@ -87,36 +87,16 @@ def kind_of(error: HexacellError) -> FailureKind:
     return OF_GUARDS.get(error.trip.guard, FailureKind.GUARD)
 
 
-@dataclass(frozen=True, slots=True)
-class RecoveryPolicy:
-    """The actions after the failures of a run.
-
-    Attributes:
-        escalations: by kind; by default every failure ends the run.
-        wait_s: cell seconds before a device is tried again.
-    """
-
-    escalations: Escalations = field(default_factory=Escalations)
-    wait_s: float = 0.0
-
-    @classmethod
-    def of(cls, settings: RecoverySettings, *, attended: bool) -> RecoveryPolicy:
-        """The policy that a cell file states."""
-        return cls(settings.attended if attended else settings.unattended, settings.wait_s)
-
-
-GIVE_UP = RecoveryPolicy()
+GIVE_UP = Escalations()
 """Every failure ends the run."""
 
 
-def failed(
-    policy: RecoveryPolicy, error: HexacellError, step: Step | None, state: RunState
-) -> events.Failed:
+def failed(policy: Escalations, error: HexacellError, step: Step | None, state: RunState) -> events.Failed:
     """The event of a failure; of several at once, the one with the most severe action decides."""
     failures: list[events.Failed] = []
     for kind in dict.fromkeys(kind_of(one) for one in causes_of(error)):
         attempt = state.attempts(kind, step) + 1
-        action = policy.escalations.action(kind, attempt)
+        action = policy.action(kind, attempt)
         failures.append(
             events.Failed(step=step, failure=kind, attempt=attempt, reason=str(error), action=action)
         )
@@ -147,7 +127,7 @@ class Recovery:
     executor: StepExecutor
     commands: CommandLoop
     broker: QuestionBroker
-    policy: RecoveryPolicy
+    policy: Escalations
     halt: Callable[[], Awaitable[HexacellError | None]]
     record: Callable[[events.Event], RunState]
 
@@ -208,7 +188,7 @@ class Recovery:
     ) -> list[events.SetInvalidated]:
         """Wait, reconnect lost devices, and give the sets that are invalid by that or by the action."""
         if not failure.asked:
-            await self.executor.clock.sleep(self.policy.wait_s)
+            await self.executor.clock.sleep(self.executor.settings.recovery.wait_s)
         is_zero_lost = False
         if failure.action is not Action.RETRY:
             known = state.started.devices if state.started else ()

@@ -13,6 +13,7 @@ from drivers.simulated.physics import RobotPhysics
 from drivers.simulated.robot import SimulatedMachine
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, dump, load_cell
+from hexacell.cell.recovery import Escalations
 from hexacell.errors import DeviceError, FileError, HexacellError
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose
@@ -23,7 +24,7 @@ from hexacell.services.run.calibration_run import run_started
 from procedures.calibration.calibration import Calibration, Mode
 from procedures.engine.commands import QuestionBroker
 from procedures.engine.engine import Engine, Listener
-from procedures.engine.recovery import GIVE_UP, RecoveryPolicy
+from procedures.engine.recovery import GIVE_UP
 from procedures.journal.journal import Journal
 from procedures.steps import events
 from procedures.workflow.next_step import StepExecutor
@@ -79,7 +80,7 @@ class Rig:
     def started(self) -> events.RunStarted:
         return run_started(self.cell, self.calibration, ())
 
-    async def run(self, *listeners: Listener, policy: RecoveryPolicy = GIVE_UP) -> events.Ended:
+    async def run(self, *listeners: Listener, policy: Escalations = GIVE_UP) -> events.Ended:
         """Begin, or go on where the folder's journal ends; ``engine`` is the one that does."""
         self.folder.path.mkdir(exist_ok=True)
         broker = QuestionBroker(self.performer.operator)

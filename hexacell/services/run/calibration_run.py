@@ -28,7 +28,6 @@ from procedures.devices.device_set import Devices, LiveValues
 from procedures.devices.reconnection import require_known
 from procedures.engine.commands import CommandQueue, QuestionBroker
 from procedures.engine.engine import Engine, Listener
-from procedures.engine.recovery import RecoveryPolicy
 from procedures.guards.position_check import PositionCheck
 from procedures.journal.journal import Journal, read_journal
 from procedures.run.questions import Operator
@@ -171,7 +170,8 @@ async def _run(
     if not request.resume:
         folder.create(cell)
     broker = QuestionBroker(request.operator)
-    policy = RecoveryPolicy.of(cell.settings.recovery, attended=not request.unattended)
+    recovery = cell.settings.recovery
+    policy = recovery.unattended if request.unattended else recovery.attended
     executor = StepExecutor(
         cell, calibration, connected.devices, connected.clock, broker, folder, connected.thermometers
     )

@@ -13,7 +13,6 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion import paths
 from hexacell.motion import paths as route_module
 from hexacell.motion.trajectory import interpolate_line
-from procedures.engine.recovery import RecoveryPolicy
 from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase
 from procedures.run.state import fold
@@ -105,7 +104,7 @@ def test_visited_poses_serve_as_waypoints(recording, calibration, monkeypatch) -
 async def test_without_a_route_the_run_ends_without_moving(make_rig, monkeypatch) -> None:
     rig = make_rig()
     monkeypatch.setattr(path_planning, "find_route", lambda *_: None)
-    policy = RecoveryPolicy.of(rig.cell.settings.recovery, attended=False)
+    policy = rig.cell.settings.recovery.unattended
     with pytest.raises(NoSafePath):
         await rig.run(policy=policy)
     assert not any(entry.startswith("move") for entry in rig.controller.log)

@@ -6,7 +6,7 @@ import pytest
 
 from hexacell.errors import DeviceError, ExitCode, FileError, Interruption, SeveralErrors, WriteBackUndone
 from procedures.engine.commands import Abort, UnattendedOperator
-from procedures.engine.recovery import RecoveryPolicy, Reversal, revert_at_end, revert_unrecorded
+from procedures.engine.recovery import Reversal, revert_at_end, revert_unrecorded
 from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
@@ -147,7 +147,7 @@ async def test_an_edit_is_noticed_before_the_next_move_and_the_file_and_line_are
 async def test_an_unattended_run_ends_and_is_resumed_once_the_edit_is_undone(recording, replayed) -> None:
     rig = replayed(recording.until(events.SetClosed), operator=UnattendedOperator())
     before = rig.config
-    policy = RecoveryPolicy.of(rig.cell.settings.recovery, attended=False)
+    policy = rig.cell.settings.recovery.unattended
     with pytest.raises(FileError, match="Undo the edit"):
         await rig.run(edits(rig, events.RecordTaken, 2), policy=policy)
     log = list(rig.controller.log)

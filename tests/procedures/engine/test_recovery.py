@@ -22,7 +22,7 @@ from drivers.errors import (
     WrongSetting,
     ZeroVoid,
 )
-from hexacell.cell.recovery import Action, FailureKind
+from hexacell.cell.recovery import Action, Escalations, FailureKind
 from hexacell.errors import (
     AnswerNeeded,
     DeviceError,
@@ -37,7 +37,7 @@ from hexacell.errors import (
 from procedures.devices.settling import NeverSettled
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Answer, Pause, Resume
-from procedures.engine.recovery import GIVE_UP, RecoveryPolicy, failed, kind_of
+from procedures.engine.recovery import GIVE_UP, failed, kind_of
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
 from procedures.run.trips import DriftTripped, Guard, Trip
@@ -253,17 +253,15 @@ def test_the_class_of_an_error_decides_its_kind(error: HexacellError, kind: Fail
 
 @pytest.mark.parametrize("policy", [ATTENDED, UNATTENDED, GIVE_UP])
 @pytest.mark.parametrize("kind", FailureKind)
-def test_every_escalation_ends(policy: RecoveryPolicy, kind: FailureKind) -> None:
-    assert policy.escalations.action(kind, 1000) in {Action.ASK, Action.ABORT}
-    assert policy.escalations.action(FailureKind.FINAL, 1) is Action.ABORT
+def test_every_escalation_ends(policy: Escalations, kind: FailureKind) -> None:
+    assert policy.action(kind, 1000) in {Action.ASK, Action.ABORT}
+    assert policy.action(FailureKind.FINAL, 1) is Action.ABORT
 
 
 def test_only_an_attended_run_asks_and_it_always_does() -> None:
     kinds = [kind for kind in FailureKind if kind is not FailureKind.FINAL]
-    assert all(ATTENDED.escalations.action(kind, 1) is Action.ASK for kind in kinds)
-    assert all(
-        UNATTENDED.escalations.action(kind, n) is not Action.ASK for kind in kinds for n in range(1, 9)
-    )
+    assert all(ATTENDED.action(kind, 1) is Action.ASK for kind in kinds)
+    assert all(UNATTENDED.action(kind, n) is not Action.ASK for kind in kinds for n in range(1, 9))
 
 
 def test_attempts_are_counted_by_kind_and_set_since_the_last_interruption() -> None:

@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 
 from drivers.errors import GaugeSilent
-from hexacell.cell.recovery import RecoverySettings
+from hexacell.cell.recovery import Escalations, RecoverySettings
 from hexacell.errors import Interruption
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.engine.commands import Stop
-from procedures.engine.recovery import GIVE_UP, RecoveryPolicy
+from procedures.engine.recovery import GIVE_UP
 from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
@@ -67,7 +67,7 @@ async def cancelled(rig: Any, when: Callable[..., Any], *listeners: Any) -> None
 
 
 async def run_until(
-    rig: Any, kind: type[Any], *listeners: Any, count: int = 1, policy: RecoveryPolicy = GIVE_UP
+    rig: Any, kind: type[Any], *listeners: Any, count: int = 1, policy: Escalations = GIVE_UP
 ) -> None:
     """Run up to the ``count``-th event of a kind; it can be resumed."""
     enough = on(kind, lambda: rig.engine.command(Stop()), count)
@@ -111,8 +111,8 @@ def somebody_edits(rig: Any) -> bytes:
     return edited
 
 
-UNATTENDED = RecoveryPolicy.of(RecoverySettings(), attended=False)
-ATTENDED = RecoveryPolicy.of(RecoverySettings(), attended=True)
+UNATTENDED = RecoverySettings().unattended
+ATTENDED = RecoverySettings().attended
 P2 = SetKey(phase=Phase.IDENTIFY, point=2)
 SILENT = GaugeSilent("does not answer", subject="gauge y")
 KEY = "P2/o03/sample"
@@ -130,7 +130,7 @@ def failing(key: str, action: Callable[[], Any], times: int = 1) -> Any:
     return listener
 
 
-async def until_closed(rig: Any, *listeners: Any, policy: RecoveryPolicy) -> bool:
+async def until_closed(rig: Any, *listeners: Any, policy: Escalations) -> bool:
     """Run until the second point is measured; whether it came to that."""
     await run_until(rig, events.SetClosed, *listeners, policy=policy)
     return fold(read_journal(rig.folder.journal)).set(P2).closed

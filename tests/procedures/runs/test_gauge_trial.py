@@ -11,7 +11,6 @@ import pytest
 from drivers.errors import GaugeSilent
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.errors import ExitCode, HexacellError, LimitError
-from procedures.engine.recovery import RecoveryPolicy
 from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase, SetKey
 from procedures.steps import events
@@ -40,7 +39,7 @@ async def test_a_person_puts_it_right_and_the_station_begins_again(make_rig) -> 
     rig = make_rig(stations__trial_mm=1.0, stations__placement="by-hand")
     make_mistake(rig, "x and y exchanged")
     rig.operator.decisions = [Action.REDO_SET]
-    policy = RecoveryPolicy.of(rig.cell.settings.recovery, attended=True)
+    policy = rig.cell.settings.recovery.attended
     await run_until(
         rig, events.GaugesPlaced, on(events.Failed, lambda: corrected(rig)), count=3, policy=policy
     )
@@ -80,7 +79,7 @@ async def test_a_gauge_that_was_connected_again_is_tried_again(make_rig) -> None
         if not silences and not rig.right_gauges:
             make_mistake(rig, "z reversed")
 
-    policy = RecoveryPolicy.of(rig.cell.settings.recovery, attended=False)
+    policy = rig.cell.settings.recovery.unattended
     with pytest.raises(HexacellError, match="gauge z: counts the wrong way"):
         await rig.run(at_step("P1/o03/sample", turned_round), policy=policy)
     assert [str(event.at) for event in happened(rig, events.GaugesTried)] == ["P1"]
@@ -130,7 +129,7 @@ async def test_a_person_is_told_how_to_move_the_gauge_and_the_set_begins_again(m
     rig = make_rig(stations__placement="by-hand")
     correct = off_the_middle(rig.gauges[0], 3.8)
     rig.operator.decisions = [Action.REDO_SET]
-    policy = RecoveryPolicy.of(rig.cell.settings.recovery, attended=True)
+    policy = rig.cell.settings.recovery.attended
     await run_until(rig, events.GaugesPlaced, on(events.Failed, correct), count=3, policy=policy)
     (problem,) = rig.operator.problems
     assert "Move the gauge by " in problem

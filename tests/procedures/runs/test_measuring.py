@@ -9,7 +9,6 @@ from hexacell.cell.recovery import Action
 from hexacell.errors import AnswerNeeded, ExitCode, LimitError
 from hexacell.kinematics.pose import Pose
 from procedures.engine.commands import UnattendedOperator
-from procedures.engine.recovery import RecoveryPolicy
 from procedures.run.trips import Guard, GuardTripped
 from procedures.steps import events
 from procedures.steps.move import Move
@@ -151,7 +150,7 @@ async def test_nothing_moves_and_the_message_says_where_the_robot_is(make_rig) -
 async def test_a_person_retries_and_the_run_plans_from_where_the_robot_is(make_rig) -> None:
     rig = make_rig()
     rig.operator.decisions = [Action.RETRY]
-    policy = RecoveryPolicy.of(rig.cell.settings.recovery, attended=True)
+    policy = rig.cell.settings.recovery.attended
     await run_until(rig, events.SetClosed, jogs(rig), policy=policy)
     assert len(happened(rig, events.Located)) > 1
     assert len(rig.operator.problems) == 1

@@ -15,7 +15,6 @@ from hexacell.cell.recovery import UnattendedRecovery
 from hexacell.errors import Interruption
 from hexacell.kinematics.pose import Pose
 from procedures.engine.commands import Abort, Stop
-from procedures.engine.recovery import RecoveryPolicy
 from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
@@ -230,7 +229,7 @@ async def test_a_device_that_fails_meanwhile_costs_no_more_than_its_recovery(ask
 
     escalations = UnattendedRecovery.model_validate({"gauge_silent": (action, "abort")})
     with pytest.raises(Interruption):
-        await asked.run(fail, policy=RecoveryPolicy(escalations))
+        await asked.run(fail, policy=escalations)
     (failure,) = happened(asked, events.Failed)
     assert isinstance(failure.step, kind)
     (found,) = happened(asked, events.NoiseMeasured)

@@ -113,20 +113,30 @@ class VerificationSettings(Section):
     seed: Seed = key(2, "random seed of the held-out orientations")
 
 
-class AcceptanceSettings(Section):
-    """When a result is good, and who approves writing it to the controller."""
+class ErrorLimits(Section):
+    """What the errors at the task poses must keep."""
 
     position_mm: Positive = key(0.15, "largest position error at the task poses, mm")
     orientation_deg: Positive = key(0.05, "largest orientation error at the task poses, deg")
     guard_band_factor: float = key(
         1.5, "factor of U by which a pass keeps away from the limits; 1.5 is three sigma", ge=1.0, le=3.0
     )
+
+
+class AcceptanceSettings(ErrorLimits):
+    """When a result is good, and who approves writing it to the controller."""
+
     largest_change_mm: Positive = key(15.0, "largest change of a parameter that no person need approve, mm")
     drift_mm: Positive = key(0.1, "largest drift of a point's reference, from its zeroing to its end, mm")
     valid_days: Positive | None = key(None, "days after which the next calibration is due")
     approval: Literal["ask", "automatic"] = key(
         "ask", "who approves a write: ask, a person; automatic, nobody within the limits above"
     )
+
+    @property
+    def of_errors(self) -> ErrorLimits:
+        """The limits of errors alone."""
+        return ErrorLimits(**self.model_dump(include={*ErrorLimits.model_fields}))
 
 
 FEWEST_STANDSTILL_READINGS = 8

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.campaign.planner import Plan
-from hexacell.cell.measuring import AcceptanceSettings
+from hexacell.cell.measuring import ErrorLimits
 from hexacell.design import candidates
 from hexacell.design.validation_poses import select_near
 from hexacell.errors import HexacellError, LimitError
@@ -60,8 +60,8 @@ class VerdictForecast:
     """
 
     probabilities: Mapping[Verdict, float]
-    limits: AcceptanceSettings
-    passing: AcceptanceSettings
+    limits: ErrorLimits
+    passing: ErrorLimits
     largest_part: str
     largest_part_mm: float
     standard_mm: float
@@ -86,9 +86,7 @@ class VerdictForecast:
         )
 
 
-def forecast_verdicts(
-    stated: Array, budget: UncertaintyBudget, limits: AcceptanceSettings
-) -> VerdictForecast:
+def forecast_verdicts(stated: Array, budget: UncertaintyBudget, limits: ErrorLimits) -> VerdictForecast:
     """The verdicts on machines that are drawn.
 
     Args:
@@ -188,7 +186,7 @@ def predicted_verdicts(
     if budget is None or after is None or len(after.jacobian) != len(budget.jacobian):
         return None
     stated = stated_errors(found, updated, budget, after, plan.robot.identified_zeros(found))
-    return forecast_verdicts(stated, after, plan.settings.acceptance)
+    return forecast_verdicts(stated, after, plan.settings.acceptance.of_errors)
 
 
 def with_held_out_records(plan: Plan, found: Identification) -> Identification:

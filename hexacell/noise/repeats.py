@@ -29,13 +29,16 @@ from hexacell.noise.approach_scatter import RepeatedApproaches
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.effect_kinds import with_measured_stops
 
-SIGNIFICANCE = 0.01
-"""Probability of the noise that is counted with below which the repeats show that it is larger."""
+SIGNIFICANCE = 0.003
+"""Probability of the noise that is counted with below which the repeats show that it is larger.
+
+With ``LIKELY`` it is the share of healthy machines of which that is said falsely; scatter as large as the
+noise has one of less than a millionth."""
 
 LEAST_FREEDOM = 9
 """Fewer degrees of freedom say nothing of use."""
 
-LIKELY = 0.02
+LIKELY = 0.003
 """Probability likewise, of the repeats and of the residuals of the fit together, below which stops that no
 encoder sees count at work. The residuals are many, so that few machines have them and are not noticed."""
 

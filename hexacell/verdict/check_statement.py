@@ -10,7 +10,7 @@ import numpy as np
 
 from hexacell.campaign.online_estimate import OnlineEstimate
 from hexacell.campaign.task_accuracy import Task
-from hexacell.cell.measuring import AcceptanceSettings
+from hexacell.cell.measuring import ErrorLimits
 from hexacell.design.criteria import add_information
 from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effects import Effect
@@ -106,7 +106,7 @@ def is_final(verdict: Verdict) -> bool:
     return verdict in {Verdict.PASS, Verdict.FAIL}
 
 
-def guarded_verdict(likeliest: TaskErrors, guarded: TaskErrors, limits: AcceptanceSettings) -> Verdict:
+def guarded_verdict(likeliest: TaskErrors, guarded: TaskErrors, limits: ErrorLimits) -> Verdict:
     """The verdict by the likeliest errors; a pass holds for the guarded ones as well.
 
     These are already those of a robot that drifted more than it is likely to: of them a pass keeps U alone.
@@ -118,7 +118,7 @@ def guarded_verdict(likeliest: TaskErrors, guarded: TaskErrors, limits: Acceptan
 
 
 def records_to_decide(
-    likeliest: ErrorEstimate, guarded: ErrorEstimate, limits: AcceptanceSettings, per_record: Array
+    likeliest: ErrorEstimate, guarded: ErrorEstimate, limits: ErrorLimits, per_record: Array
 ) -> int | None:
     """How many more records would decide if they confirm the likeliest estimate.
 

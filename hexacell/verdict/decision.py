@@ -17,7 +17,7 @@ from math import isfinite
 from typing import TYPE_CHECKING, Literal, Self
 
 from hexacell.cell.fields import Frozen, SixNumbers
-from hexacell.cell.measuring import AcceptanceSettings
+from hexacell.cell.measuring import ErrorLimits
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.lengths import ShownUnit, unit_of
 from hexacell.results.result import LengthResult
@@ -106,7 +106,7 @@ def worst_verdict(verdicts: Iterable[Verdict]) -> Verdict:
     return max(verdicts, key=order.index, default=Verdict.NOT_EVALUATED)
 
 
-def decide_both(position: LargestError, orientation: LargestError, limits: AcceptanceSettings) -> Verdict:
+def decide_both(position: LargestError, orientation: LargestError, limits: ErrorLimits) -> Verdict:
     """The verdict on the largest errors, mm and deg, together."""
     of_position = decide(position, limits.position_mm, limits.guard_band_factor)
     return worst_verdict(
@@ -121,7 +121,7 @@ class GeometryErrors(Frozen):
     orientation: JudgedError
 
     @classmethod
-    def of(cls, errors: TaskErrors, limits: AcceptanceSettings) -> Self:
+    def of(cls, errors: TaskErrors, limits: ErrorLimits) -> Self:
         """The decision on errors under limits."""
         factor = limits.guard_band_factor
         return cls(

@@ -28,7 +28,7 @@ def repeats(ratio: float, random) -> Repeats:
 def test_noise_as_stated_stays_as_it_is() -> None:
     random = np.random.default_rng(1)
     found = [repeats(1.0, random).applied_to(NOISE) for _ in range(500)]
-    assert np.mean([one == NOISE for one in found]) == pytest.approx(0.99, abs=0.01)
+    assert np.mean([one == NOISE for one in found]) > 0.99
 
 
 @pytest.mark.sample("2.0")

@@ -109,8 +109,16 @@ def position_derivatives(
     """
     at = belief.mechanism, belief.estimate, targets.poses, targets.joints
     sensitivity = free_sensitivity(*at, POSITION)
+    return _with_terms(belief, sensitivity.free, targets, directions), sensitivity.joints
+
+
+def _with_terms(
+    belief: RobotBelief, free: Array, targets: ReachableTargets, directions: Array | None
+) -> Array:
+    if belief.terms is None:
+        return free
     by_terms = belief.by_terms(targets.poses, targets.joints, directions)
-    return np.concatenate([sensitivity.free, by_terms], axis=-1), sensitivity.joints
+    return np.concatenate([free, by_terms], axis=-1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -169,8 +177,7 @@ def predict_clear_records(
     """
     at = belief.mechanism, belief.estimate, targets.poses, targets.joints
     sensitivity, clear = sensitivity_and_margin(*at, POSITION, belief.limits.singularity_margin)
-    by_terms = belief.by_terms(targets.poses, targets.joints, np.sign(targets.joints - zero.before))
-    by_all = np.concatenate([sensitivity.free, by_terms], axis=-1)
+    by_all = _with_terms(belief, sensitivity.free, targets, np.sign(targets.joints - zero.before))
     records = _predicted(belief, zero, targets, by_all, sensitivity.joints)
     return records, clear & (sensitivity.mode == mode)
 

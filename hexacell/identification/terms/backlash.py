@@ -14,13 +14,14 @@ from hexacell.kinematics.rotations import Array
 
 def backlash(size: float, unit: JointUnit = JointUnit.MM) -> ModelTerm:
     """The backlash of each joint; ``size`` is in the unit of the joints."""
-
-    def lagging(placement: Placement, directions: Array) -> Array:
-        return np.asarray(-0.5 * placement.derivatives.joints * directions)
-
-    def where_unknown(placement: Placement, directions: Array) -> Array:
-        return np.where(directions == 0.0, 0.5 * placement.derivatives.joints, 0.0)
-
     return ModelTerm(
-        "backlash", str(unit), size, lagging, needs_directions=True, on_either_side=where_unknown
+        "backlash", str(unit), size, _lagging, needs_directions=True, on_either_side=_where_unknown
     )
+
+
+def _lagging(placement: Placement, directions: Array) -> Array:
+    return np.asarray(-0.5 * placement.derivatives.joints * directions)
+
+
+def _where_unknown(placement: Placement, directions: Array) -> Array:
+    return np.where(directions == 0.0, 0.5 * placement.derivatives.joints, 0.0)

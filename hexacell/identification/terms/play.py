@@ -6,6 +6,7 @@ bring the platform to where the force keeps it there.
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -21,18 +22,30 @@ WRONG_SIDE = float(np.sqrt(0.5))
 
 def play(size_mm: float, direction: Array, centre_mm: Array | None = None) -> ModelTerm:
     """The play of each leg; where and whereto the weight acts as in :func:`.leg_forces`."""
+    acts = direction, centre_mm
+    return ModelTerm(
+        "play",
+        "mm",
+        size_mm,
+        partial(_on_one_side, *acts),
+        on_either_side=partial(_on_either_side, size_mm, *acts),
+    )
 
-    def on_one_side(placement: Placement, _directions: Array) -> Array:
-        return np.asarray(-0.5 * np.sign(leg_forces(placement, direction, centre_mm)))
 
-    def on_either_side(placement: Placement, _directions: Array) -> Array:
-        pulls = leg_forces(placement, direction, centre_mm) > 0.0
-        either = np.zeros_like(pulls)
-        for leg in range(LEGS):
-            for longer_mm in (-size_mm, size_mm):
-                moved = apply_twist(placement.poses, longer_mm * placement.by_constraints[:, :, leg])
-                there = leg_forces(replace(placement, poses=moved), direction, centre_mm)
-                either[:, leg] |= (there[:, leg] > 0.0) != pulls[:, leg]
-        return WRONG_SIDE * either
+def _on_one_side(
+    direction: Array, centre_mm: Array | None, placement: Placement, _directions: Array
+) -> Array:
+    return np.asarray(-0.5 * np.sign(leg_forces(placement, direction, centre_mm)))
 
-    return ModelTerm("play", "mm", size_mm, on_one_side, on_either_side=on_either_side)
+
+def _on_either_side(
+    size_mm: float, direction: Array, centre_mm: Array | None, placement: Placement, _directions: Array
+) -> Array:
+    pulls = leg_forces(placement, direction, centre_mm) > 0.0
+    either = np.zeros_like(pulls)
+    for leg in range(LEGS):
+        for longer_mm in (-size_mm, size_mm):
+            moved = apply_twist(placement.poses, longer_mm * placement.by_constraints[:, :, leg])
+            there = leg_forces(replace(placement, poses=moved), direction, centre_mm)
+            either[:, leg] |= (there[:, leg] > 0.0) != pulls[:, leg]
+    return WRONG_SIDE * either

@@ -23,7 +23,7 @@ from hexacell.identification.placement import RecordPlacement
 from hexacell.identification.solver.linear_model import LinearCosts
 from hexacell.identification.solver.result import Identification
 from hexacell.identification.terms.finding import Finding, TermFinding
-from hexacell.identification.terms.taken import TakenTerms, deformed
+from hexacell.identification.terms.taken import deformed, spread_of
 from hexacell.identification.terms.term import ModelTerm
 
 ERROR_OF_FIRST_KIND = 0.01
@@ -146,8 +146,9 @@ class _Search:
         return ""
 
     def _model(self, terms: Model) -> LinearCosts:
-        every = np.ones(len(self.records), dtype=bool)
-        return self.without.with_causes(TakenTerms.of(terms, self.records, every).columns)
+        each = (term.pose_errors(self.records, self.records.directions)[:, :3] for term in terms)
+        by_coefficients = np.concatenate([np.empty((len(self.records), 3, 0)), *each], axis=-1)
+        return self.without.with_causes(by_coefficients @ spread_of(terms))
 
     def _evidence(self, terms: Model) -> float:
         every = np.ones(len(self.records), dtype=bool)

@@ -26,7 +26,7 @@ DID_NOT_END = "did not run to its end"
 HEAD = """# Figures of the benchmarks
 
 Written by `make figures` from `build/figures.json`, which `make bench` writes (`FULL=1`: with the samples \
-of the targets, for hours). A figure of another commit names it; cases with one target share a row. \
+of the targets, for hours). A figure of another commit has its mark; cases with one target share a row. \
 **missed** is a target that was not reached. [Measured](measured.md) has what else was found.
 
 """
@@ -198,6 +198,29 @@ def machine() -> str:
     return f"{len(os.sched_getaffinity(0))} cores, {name}, Python {platform.python_version()}"
 
 
+Rows = dict[tuple[str, str, str, str], list[Figure]]
+
+
+def _marks(commits: Iterable[str]) -> dict[str, str]:
+    """A mark for the figures of each commit."""
+    return {commit: "\\*" * number for number, commit in enumerate(sorted(commits), start=1)}
+
+
+def _joined(rows: Rows) -> Rows:
+    """Rows of one figure whose cases all have the same value, with other targets, as one."""
+    joined: Rows = {}
+    last: dict[tuple[str, ...], tuple[str, str, str, str]] = {}
+    for (module, name, unit, target), ones in rows.items():
+        values, every, targets = {one.shown for one in ones}, ones, target
+        same = (module, name, unit, *values)
+        if len(values) == 1 and same in last and "**" not in target + last[same][3]:
+            every = [*joined.pop(last[same]), *ones]
+            targets = f"{last[same][3]}; {target}"
+        last[same] = (module, name, unit, targets)
+        joined[module, name, unit, targets] = every
+    return joined
+
+
 def table(figures: Iterable[Figure], present: str) -> str:
     """The figures that have a target as a page, and what did not come to its end.
 
@@ -207,14 +230,16 @@ def table(figures: Iterable[Figure], present: str) -> str:
     every = sorted(figures, key=lambda one: one.benchmark.partition("::")[0])
     listed = [one for one in every if one.met is not None or one.name == DID_NOT_END]
     never = [one for one in listed if one.met and one.target == str(NEVER)]
-    alike: dict[tuple[str, str, str, str], list[Figure]] = {}
+    others = _marks({one.commit for one in every if one.commit.rstrip("+") != present.rstrip("+")})
+    alike: Rows = {}
     for one in listed:
         if one not in never:
             target = one.target.replace("at most", "\N{LESS-THAN OR EQUAL TO}")
             marks = [target.replace("at least", "\N{GREATER-THAN OR EQUAL TO}")] if target else []
             marks += [] if one.met else ["**missed**"]
-            marks += [] if one.commit.rstrip("+") == present.rstrip("+") else [f"at {one.commit}"]
+            marks += [] if one.commit.rstrip("+") == present.rstrip("+") else [others[one.commit]]
             alike.setdefault((_module(one), _name(one), one.unit, ", ".join(marks)), []).append(one)
+    alike = _joined(alike)
     rows = ["| benchmark | figure | measured | target |", "|---|---|---|---|"]
     above = ""
     for (module, name, unit, target), ones in alike.items():
@@ -230,7 +255,8 @@ def table(figures: Iterable[Figure], present: str) -> str:
         f"the {len(never)} of what must never happen, and did not, are not listed."
     )
     machines = "; ".join(sorted({one.machine for one in every}))
-    text = f"{HEAD}Commit {present}; {machines}. {counts}\n\n"
+    of_others = "".join(f"; {mark} {commit}" for commit, mark in others.items())
+    text = f"{HEAD}Commit {present}{of_others}; {machines}. {counts}\n\n"
     return text + "\n".join(rows) + "\n"
 
 

@@ -13,7 +13,7 @@ from hexacell import services
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.model import CellSettings
-from hexacell.design.candidate_refinement import SearchEffort
+from hexacell.design.search_effort import SearchEffort
 from procedures.steps import events
 
 FREE: dict[str, Any] = {

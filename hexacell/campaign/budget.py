@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping, Set
 from dataclasses import dataclass
 
-from hexacell.campaign.decisions import CampaignState, pilots_per_departure
+from hexacell.campaign.decisions import CampaignState
+from hexacell.campaign.pilots import pilots_per_departure
 from hexacell.cell.limits import SpeedSettings
 from hexacell.cell.model import CellSettings
 from hexacell.kinematics.parameters import JointUnit

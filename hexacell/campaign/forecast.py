@@ -25,7 +25,7 @@ from hexacell.design import candidates
 from hexacell.design.candidates import ReachableTargets, reachable
 from hexacell.design.criteria import D_OPTIMAL, add_information, covariance_update
 from hexacell.design.pose_selection import SelectedPose
-from hexacell.design.predicted_records import position_derivatives
+from hexacell.design.predicted_records import position_derivatives, with_terms
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -268,7 +268,7 @@ def _select(drawn: RobotBelief, poses: PoseBatch, records: int) -> PoseBatch:
     covariance = drawn.joint_covariance
     for _ in range(min(records, len(targets)) - 1):
         arrived = np.sign(targets.joints - targets.joints[selected[-1]])
-        every = np.concatenate([free, drawn.by_terms(targets.poses, targets.joints, arrived)], axis=-1)
+        every = with_terms(drawn, free, targets, arrived)
         change = every - every[0]
         gain = D_OPTIMAL.gain(covariance, change, noise)
         gain[selected] = -np.inf

@@ -17,7 +17,7 @@ from typing import Protocol
 
 import numpy as np
 
-from hexacell.campaign.decisions import are_counted
+from hexacell.campaign.pilots import are_counted
 from hexacell.design.predicted_records import GaugeZero, gauge_zero_at
 from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief

@@ -15,10 +15,6 @@ import numpy as np
 
 from hexacell.campaign.budget import Budget, shared_sizes
 from hexacell.campaign.decisions import (
-    CAUTION,
-    FIRST_PILOT,
-    MOST_PILOTS,
-    MOST_TO_A_LIST,
     CampaignState,
     Decision,
     Finished,
@@ -26,16 +22,16 @@ from hexacell.campaign.decisions import (
     Forecast,
     MeasurePose,
     StartPoint,
-    pilots_per_departure,
 )
 from hexacell.campaign.forecast import Forecaster, PlannedInformation, select_sets
 from hexacell.campaign.online_estimate import OnlineEstimate, OnlineEstimator, RecordEstimator
+from hexacell.campaign.pilots import CAUTION, FIRST_PILOT, MOST_PILOTS, MOST_TO_A_LIST, pilots_per_departure
 from hexacell.campaign.pose_chooser import PoseChooser, is_well_known
 from hexacell.campaign.pose_list import PoseList
 from hexacell.campaign.stopping_rules import Goal, StoppingRules
 from hexacell.campaign.task_accuracy import Task, planned_systematic_mm
 from hexacell.cell.model import CellSettings
-from hexacell.design.candidate_refinement import USUAL_EFFORT, SearchEffort
+from hexacell.design.search_effort import USUAL_EFFORT, SearchEffort
 from hexacell.errors import IdentifiabilityError, LimitError
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch

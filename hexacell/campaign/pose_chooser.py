@@ -11,11 +11,11 @@ from hexacell.campaign.pose_list import PoseList
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.design import candidates
-from hexacell.design.candidate_refinement import SearchEffort
 from hexacell.design.candidates import Amplitudes
 from hexacell.design.criteria import D_OPTIMAL, Criterion
 from hexacell.design.pose_selection import SelectedPose, select_from_list, select_pose
 from hexacell.design.predicted_records import GaugeZero
+from hexacell.design.search_effort import SearchEffort
 from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.identified_zeros import ParameterChoice, zero_columns

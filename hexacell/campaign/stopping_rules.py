@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-from hexacell.campaign.decisions import CampaignState, MeasurePose, are_counted
+from hexacell.campaign.decisions import CampaignState, MeasurePose
 from hexacell.campaign.forecast import Forecaster
 from hexacell.campaign.online_estimate import RecordEstimator
+from hexacell.campaign.pilots import are_counted
 from hexacell.cell.model import CellSettings
 from hexacell.lengths import shown
 from hexacell.measurements.records import MeasurementSet

@@ -18,7 +18,7 @@ from hexacell.campaign.online_estimate import OnlineEstimate, OnlineEstimator, R
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import PoseList
 from hexacell.cell.model import CellSettings
-from hexacell.design.candidate_refinement import USUAL_EFFORT, SearchEffort
+from hexacell.design.search_effort import USUAL_EFFORT, SearchEffort
 from hexacell.identification.problem.prior import IdentifiedBefore, drift_covariance, drift_sigma
 from hexacell.identification.solver.chi_square import ChiSquareVerdict
 from hexacell.kinematics.geometry import Geometry

@@ -12,6 +12,7 @@ from hexacell.design.candidates import ReachableTargets, commands_for
 from hexacell.design.criteria import innovation_covariance
 from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief
+from hexacell.identification.placement import Placement
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.forward import modes_of
 from hexacell.kinematics.pose import Batch, PoseBatch
@@ -54,6 +55,10 @@ class GaugeZero:
     def target(self) -> ReachableTargets:
         """The reference as a target (1)."""
         return ReachableTargets(PoseBatch.at(self.reference, self.orientation[None]), self.joints[None])
+
+    def directions_to(self, targets: ReachableTargets) -> Array:
+        """The directions (n, 6) from which joints arrive at n targets from where the robot is."""
+        return np.sign(targets.joints - self.before)
 
     def command(self, belief: RobotBelief) -> PoseBatch:
         """The command (1) of the reference."""
@@ -109,16 +114,19 @@ def position_derivatives(
     """
     at = belief.mechanism, belief.estimate, targets.poses, targets.joints
     sensitivity = free_sensitivity(*at, POSITION)
-    return _with_terms(belief, sensitivity.free, targets, directions), sensitivity.joints
+    return with_terms(belief, sensitivity.free, targets, directions), sensitivity.joints
 
 
-def _with_terms(
+def with_terms(
     belief: RobotBelief, free: Array, targets: ReachableTargets, directions: Array | None
 ) -> Array:
+    """Derivatives (n, 3, p) by the free parameters, with those by the coefficients of terms after them."""
     if belief.terms is None:
         return free
-    by_terms = belief.by_terms(targets.poses, targets.joints, directions)
-    return np.concatenate([free, by_terms], axis=-1)
+    at = Placement(belief.mechanism, belief.estimate, targets.poses, targets.joints)
+    arrived = np.zeros_like(targets.joints) if directions is None else directions
+    columns = (term.pose_errors(at, arrived)[:, :3] for term in belief.terms.terms)
+    return np.concatenate([free, *columns], axis=-1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,7 +172,7 @@ class PredictedRecords(Batch):
 
 def predict_records(belief: RobotBelief, zero: GaugeZero, targets: ReachableTargets) -> PredictedRecords:
     """The records of some targets at a point whose gauges were zeroed at ``zero``."""
-    derivatives = position_derivatives(belief, targets, np.sign(targets.joints - zero.before))
+    derivatives = position_derivatives(belief, targets, zero.directions_to(targets))
     return _predicted(belief, zero, targets, *derivatives)
 
 
@@ -177,7 +185,7 @@ def predict_clear_records(
     """
     at = belief.mechanism, belief.estimate, targets.poses, targets.joints
     sensitivity, clear = sensitivity_and_margin(*at, POSITION, belief.limits.singularity_margin)
-    by_all = _with_terms(belief, sensitivity.free, targets, np.sign(targets.joints - zero.before))
+    by_all = with_terms(belief, sensitivity.free, targets, zero.directions_to(targets))
     records = _predicted(belief, zero, targets, by_all, sensitivity.joints)
     return records, clear & (sensitivity.mode == mode)
 

@@ -74,17 +74,6 @@ class RobotBelief:
         """This belief with gauges that were zeroed where they show ``shown_mm`` along base x, y, z."""
         return self if shown_mm is None else replace(self, limits=self.limits.zeroed_at(shown_mm))
 
-    def by_terms(self, poses: PoseBatch, joints: Array, directions: Array | None) -> Array:
-        """Derivatives (n, 3, 6 m) of the ball's position at n poses by the coefficients of m terms.
-
-        Joints arrive there from ``directions`` (n, 6), 0 or None where that is not known.
-        """
-        terms = () if self.terms is None else self.terms.terms
-        at = Placement(self.mechanism, self.estimate, poses, joints)
-        arrived = np.zeros_like(joints) if directions is None else directions
-        columns = (term.pose_errors(at, arrived)[:, :3] for term in terms)
-        return np.concatenate([np.empty((len(joints), 3, 0)), *columns], axis=-1)
-
     @cached_property
     def joint_covariance(self) -> Array:
         """Covariance (p + 6 m, p + 6 m) of the free parameters and of the coefficients of m terms."""

@@ -4,7 +4,7 @@ What a cell file states is where a run starts. The joints of a machine that does
 each time; the encoders see it, and the gauges show it. A limit is therefore widened to what chance explains
 by the scatter that was measured, unless the cell file says that it is fixed. A difference of the gauges at
 one reference is compared only as far as the encoders do not explain it: what is left, beyond its noise and
-what is not known of the geometry (:mod:`.approach_scatter`), is a gauge that slipped, or something that
+what is not known of the geometry (:mod:`.ball_by_encoders`), is a gauge that slipped, or something that
 moved.
 """
 
@@ -24,7 +24,7 @@ from hexacell.identification.solver.term_estimates import TermEstimates
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
-from hexacell.noise.approach_scatter import BallByEncoders
+from hexacell.noise.ball_by_encoders import BallByEncoders
 from hexacell.robot.model import Robot
 from hexacell.robot.stated import gauge_travel_of
 

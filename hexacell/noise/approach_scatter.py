@@ -3,7 +3,7 @@
 What the encoders see of the ball's motion is no error of the model: it shows how far the joints stop beside
 their commands. The rest is, for each visit less their mean, ``r = d - G q`` with ``G = dP/dq``, whose
 covariance follows from the noise of encoders and gauges that is stated for a record, and from what is not
-known of G. Whether there is more is a chi-square test. Where it comes from, ball
+known of G (:mod:`.ball_by_encoders`). Whether there is more is a chi-square test. Where it comes from, ball
 and joints show together: with stops s, play p, and errors e and g of encoders and gauges,
 
     q = s + e,      d = G (s + p) + g.
@@ -21,73 +21,10 @@ import numpy as np
 
 from hexacell.cell.fields import Frozen
 from hexacell.distributions import chi_square_exceedance, chi_square_limit
-from hexacell.identification.belief import RobotBelief
-from hexacell.kinematics.forward import apply_twist
 from hexacell.kinematics.parameters import LEGS, JointUnit
-from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.kinematics.sensitivity import POSITION, free_sensitivity, pose_sensitivity
+from hexacell.noise.ball_by_encoders import BallByEncoders
 from hexacell.noise.standstill import SIGNIFICANCE
-from hexacell.robot.model import Robot
-from hexacell.uncertainty.statement import covariance_factor
-
-STEP_MM = 0.1
-"""Length by which the ball is moved for the derivative of its sensitivities."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class BallByEncoders:
-    """The motion of the ball along base x, y, z by small changes of the joint variables.
-
-    At the same commanded pose a machine that does not repeat stops elsewhere each time. The encoders show
-    where its joints are, and so where the ball is: ``G dq``. The geometry is not known exactly, and G
-    changes with it: by parameters p with the covariance C the motion is known with the covariance
-    ``(dG/dp dq) C (dG/dp dq)^T`` beside the noise. A
-    larger difference of the gauges has another cause than where the joints are.
-
-    Attributes:
-        by_joints: derivative G (3, 6), mm by the unit of the joint variables.
-        unknown: (3, p, 6) changes of G by one standard deviation of what is not known of the geometry.
-    """
-
-    by_joints: Array
-    unknown: Array
-
-    @classmethod
-    def at(cls, robot: Robot, belief: RobotBelief, command: PoseBatch) -> BallByEncoders:
-        """Near a command (1) of a robot, in the frame convention.
-
-        Raises:
-            LinAlgError: the pose is exactly at a singularity.
-        """
-        mechanism, geometry = belief.mechanism, belief.estimate
-        actual = belief.commanded.actual_poses(command)
-        if actual.found[0]:
-            poses, joints = actual.poses, actual.joints
-        else:  # the robot as drawn cannot be there, and yet it is: nearly at the command
-            poses = command
-            joints = mechanism.inverse(belief.controller, belief.branch, command)
-        whole = pose_sensitivity(mechanism, geometry, poses, joints).joints[0]
-        steps = STEP_MM / np.linalg.norm(whole[:3], axis=0)
-        moved = np.concatenate([np.diag(steps), -np.diag(steps)])
-        near = apply_twist(poses[np.zeros(len(moved), dtype=int)], moved @ whole.T)
-        by_free = free_sensitivity(mechanism, geometry, near, joints + moved, POSITION).free
-        ahead, behind = np.split(by_free, 2)
-        changes = (ahead - behind) / (2.0 * steps[:, None, None])
-        factor = covariance_factor(belief.covariance)
-        to_base = robot.frames.base.T
-        unknown = np.einsum("ab,jbp,pk->akj", to_base, changes, factor)
-        return cls(to_base @ whole[:3], np.asarray(unknown))
-
-    def motion(self, joints: Array) -> Array:
-        """How far the ball moves (..., 3), mm, as the joint variables change by (..., 6)."""
-        return np.asarray(joints @ self.by_joints.T)
-
-    def covariance(self, joints: Array) -> Array:
-        """What is not known of that motion (..., 3, 3), mm^2, because the geometry is not."""
-        columns = np.einsum("apj,...j->...ap", self.unknown, joints)
-        return np.asarray(columns @ np.swapaxes(columns, -1, -2))
-
 
 FEWEST_VISITS = 3
 """Fewer visits, the first one included, show nothing."""

@@ -21,12 +21,8 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.noise.approach_scatter import (
-    BallByEncoders,
-    RepeatedApproaches,
-    ScatterSource,
-    approach_scatter,
-)
+from hexacell.noise.approach_scatter import RepeatedApproaches, ScatterSource, approach_scatter
+from hexacell.noise.ball_by_encoders import BallByEncoders
 from hexacell.noise.measured_noise import (
     AveragingForecast,
     InstrumentNoise,

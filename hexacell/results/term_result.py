@@ -112,19 +112,28 @@ def known_terms(offered: Iterable[ModelTerm], results: Iterable[TermResult]) -> 
 
 
 def impossible_terms(offered: Iterable[ModelTerm], results: Iterable[TermResult]) -> list[str]:
-    """Coefficients that are surely negative, or surely beyond what is stated of their term, in words.
+    """Coefficients that no machine has, in words, with what to check.
 
     Lost motion, clearance and compliance have no sign. A weight that pulls the other way than is stated has
-    all of them negative.
+    those by its forces negative.
     """
-    stated = {term.name: SURE * float(np.linalg.norm(term.spread, axis=1).max()) for term in offered}
-    return [
-        f"a {one.name} of {value:.3g} +- {sigma:.2g} {one.unit} (leg {leg})"
-        for one in results
-        if one.values is not None and one.sigma is not None
-        for leg, (value, sigma) in enumerate(zip(one.values, one.sigma, strict=True), start=1)
-        if value + SURE * sigma < 0.0 or value - SURE * sigma > stated.get(one.name, np.inf)
-    ]
+    by_name, found = {term.name: term for term in offered}, list[str]()
+    for one in results:
+        if one.values is None or one.sigma is None or one.name not in by_name:
+            continue
+        term, values, spread = by_name[one.name], np.array(one.values), SURE * np.array(one.sigma)
+        stated = SURE * float(np.linalg.norm(term.spread, axis=1).max())
+        check = "what the controller corrects already" if term.needs_directions else "where the weight acts"
+        for rows, what in (
+            (values + spread < 0.0, f"below zero; check {check}"),
+            (values - spread > stated, f"far beyond what [model] states of it; check that and {check}"),
+        ):
+            if rows.any():
+                legs = ", ".join(map(str, 1 + np.flatnonzero(rows)))
+                found.append(
+                    f"{one.name} of {one.values[int(rows.argmax())]:.3g} {one.unit} (leg {legs}), {what}"
+                )
+    return found
 
 
 def corrections_for(

@@ -1,6 +1,6 @@
 """The application layer: runs, replays, the demo and the devices of a cell, put together."""
 
-from hexacell.design.candidate_refinement import USUAL_EFFORT, SearchEffort
+from hexacell.design.search_effort import USUAL_EFFORT, SearchEffort
 
 EFFORT: SearchEffort = USUAL_EFFORT
 """Of every search that this program makes; tests of whole runs replace it by a smaller one.

@@ -71,8 +71,7 @@ def gates(
         ),
     ]
     if impossible:
-        found = "; ".join(impossible)
-        sentence = f"No machine has {found}. Check own_weight_direction, own_weight_centre_mm and [model]."
+        sentence = " ".join(f"No machine has {one}." for one in impossible)
         checked.append(AcceptanceGate(name="physical", passed=False, sentence=sentence))
     if expired is not None:  # others do not accept a result by an instrument with an expired certificate
         sentence = "The certificates of the instruments were valid when the run began."

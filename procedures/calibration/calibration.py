@@ -21,7 +21,7 @@ from hexacell.campaign.pose_list import PoseList
 from hexacell.cell.model import CellSettings
 from hexacell.checks.check import Check, identified_before
 from hexacell.checks.quick_level import QuickLevel
-from hexacell.design.candidate_refinement import USUAL_EFFORT, SearchEffort
+from hexacell.design.search_effort import USUAL_EFFORT, SearchEffort
 from hexacell.errors import IdentifiabilityError
 from hexacell.identification.estimator import identify
 from hexacell.identification.identified_zeros import ParameterChoice

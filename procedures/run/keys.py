@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator
 
-from hexacell.campaign.decisions import pilot_number
+from hexacell.campaign.pilots import pilot_number
 from hexacell.cell.fields import Frozen
 from hexacell.kinematics.parameters import LEGS
 from hexacell.measurements.records import Directions

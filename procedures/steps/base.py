@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from dataclasses import replace
 from typing import ClassVar
 
-from hexacell.campaign.decisions import pilot_number
+from hexacell.campaign.pilots import pilot_number
 from hexacell.cell.fields import Frozen
 from procedures.resources.run_resources import RunResources
 from procedures.run.cancellation import in_thread
@@ -111,7 +111,7 @@ class StepOfSet(BaseStep):
 class StepAtPose(StepOfSet):
     """A step at one pose of a set; the first orientation is its reference.
 
-    Pilot poses have orientations that no record has (:mod:`hexacell.campaign.decisions`).
+    Pilot poses have orientations that no record has (:mod:`hexacell.campaign.pilots`).
     """
 
     orientation: int

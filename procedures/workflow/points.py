@@ -2,18 +2,18 @@
 
 The noise is measured at the first reference: read at rest, leave and come back. As long as little is known
 of the robot it leaves for pilot poses, which steer the choice of the others
-(:mod:`hexacell.campaign.decisions`), and else for level ones beside the reference.
+(:mod:`hexacell.campaign.pilots`), and else for level ones beside the reference.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell.campaign.decisions import FIRST_PILOT, FinishPoint, MeasurePose, StartPoint
+from hexacell.campaign.decisions import FinishPoint, MeasurePose, StartPoint
+from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.campaign.planner import Plan
 from hexacell.errors import HexacellError
 from hexacell.kinematics.rotations import Array
-from hexacell.noise.allowances import Allowances
 from hexacell.noise.noise_assessment import visits_agree
 from procedures.calibration.calibration import campaign_state
 from procedures.calibration.repeatability import noise_readings
@@ -74,8 +74,7 @@ class NoiseSteps:
 
         A robot that shows other places each time it is at one is not known by what it shows.
         """
-        allowances = Allowances(self.plan.settings, self.plan.robot)
-        visits = noise_readings(state.set(key), self.plan.settings.encoders, allowances)
+        visits = noise_readings(state.set(key), self.plan.settings.encoders, self.sets.allowances)
         if not visits_agree(self.plan.cautious, visits):
             return None
         pilot = self.plan.pilot_pose(campaign_state(state, key))

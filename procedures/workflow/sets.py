@@ -14,7 +14,8 @@ from itertools import product
 
 import numpy as np
 
-from hexacell.campaign.decisions import MeasurePose, pilot_number, with_pilots
+from hexacell.campaign.decisions import MeasurePose
+from hexacell.campaign.pilots import pilot_number, with_pilots
 from hexacell.design.predicted_records import GaugeZero
 from hexacell.errors import HexacellError, LimitError
 from hexacell.identification.belief import RobotBelief

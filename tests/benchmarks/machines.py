@@ -14,7 +14,7 @@ from hexacell.campaign.planner import Plan
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.checks.check import Check, identified_before
-from hexacell.design.candidate_refinement import SearchEffort
+from hexacell.design.search_effort import SearchEffort
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.geometry import Geometry

@@ -39,7 +39,9 @@ CANDIDATES = 512
 
 @dataclass(frozen=True)
 class Machine:
-    """Sizes of what is not geometry: mm, mm and um/N; and the largest ratio of its error to none's.
+    """Sizes of what is not geometry: from side to side, mm, mm and um/N; and how much worse it may be.
+
+    ``at_most`` is the largest ratio of its error to that of a machine without.
 
     It gets warmer by ``warmer_k`` an hour.
     """
@@ -51,24 +53,21 @@ class Machine:
     warmer_k: float = 0.0
 
     def drawn(self, random: np.random.Generator) -> dict[str, Array]:
-        """Coefficients of each joint or leg: between half of the size and all of it, or within 20 %."""
-        return {
-            "backlash": self.backlash * random.uniform(0.5, 1.0, 6),
-            "play": self.play * random.uniform(0.5, 1.0, 6),
-            "compliance": self.compliance * (1.0 + 0.2 * random.standard_normal(6)),
-        }
+        """Coefficients of each joint or leg, which differ by 20 %."""
+        sizes = {"backlash": self.backlash, "play": self.play, "compliance": self.compliance}
+        return {name: size * (1.0 + 0.2 * random.standard_normal(6)) for name, size in sizes.items()}
 
 
 MACHINES_OF_A_KIND = {
     "none of them": Machine(at_most=1.05),
-    "play 0.1 mm": Machine(play=0.1),
-    "play 0.02 mm": Machine(play=0.02),
-    "backlash 0.1 mm": Machine(backlash=0.1),
-    "backlash 0.02 mm": Machine(backlash=0.02),
+    "play +-0.1 mm": Machine(play=0.2),
+    "play +-0.02 mm": Machine(play=0.04),
+    "backlash +-0.1 mm": Machine(backlash=0.2),
+    "backlash +-0.02 mm": Machine(backlash=0.04),
     "compliance 0.3 um/N": Machine(compliance=0.3),
-    "backlash, warmer by 3 K": Machine(backlash=0.1, warmer_k=3.0, at_most=1.4),
-    "play and compliance": Machine(play=0.1, compliance=0.3, at_most=1.4),
-    "all at a third": Machine(0.033, 0.033, 0.1, at_most=1.4),
+    "backlash, warmer by 3 K": Machine(backlash=0.2, warmer_k=3.0, at_most=1.4),
+    "play and compliance": Machine(play=0.2, compliance=0.3, at_most=1.4),
+    "all at a third": Machine(0.067, 0.067, 0.1, at_most=1.4),
 }
 
 

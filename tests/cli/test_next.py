@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hexacell import services
-from hexacell.design.candidate_refinement import SearchEffort
+from hexacell.design.search_effort import SearchEffort
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from hexacell.campaign.decisions import FIRST_PILOT, MOST_TO_A_LIST, pilot_number
+from hexacell.campaign.pilots import FIRST_PILOT, MOST_TO_A_LIST, pilot_number
 from hexacell.cell.fields import LARGEST_NUMBER, GeometryDocument, SixNumbers
 from hexacell.cell.measuring import MOST_POINTS, MOST_POSES
 from hexacell.cell.model import CellSettings

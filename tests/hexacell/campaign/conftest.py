@@ -14,7 +14,8 @@ from hexacell.cell.loader import load_cell
 from hexacell.cell.measuring import AcceptanceSettings
 from hexacell.checks.check import Check, identified_before
 from hexacell.config.layout import ConfigLayout
-from hexacell.design.candidate_refinement import QUICK, SearchEffort
+from hexacell.design.candidate_refinement import QUICK
+from hexacell.design.search_effort import SearchEffort
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot.model import Robot, make_robot

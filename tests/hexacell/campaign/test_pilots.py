@@ -5,15 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.campaign.decisions import (
-    CAUTION,
-    FIRST_PILOT,
-    CampaignState,
-    StartPoint,
-    are_counted,
-    pilot_number,
-    with_pilots,
-)
+from hexacell.campaign.decisions import CampaignState, StartPoint
+from hexacell.campaign.pilots import CAUTION, FIRST_PILOT, are_counted, pilot_number, with_pilots
 from hexacell.campaign.stopping_rules import StoppingRules
 from hexacell.identification.estimator import estimate_online
 from hexacell.measurements.records import MeasurementSet

@@ -9,7 +9,8 @@ import pytest
 
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.sensitivity import POSITION, pose_sensitivity
-from hexacell.noise.approach_scatter import BallByEncoders, ScatterSource, approach_scatter
+from hexacell.noise.approach_scatter import ScatterSource, approach_scatter
+from hexacell.noise.ball_by_encoders import BallByEncoders
 
 NOISE = 0.01
 VISITS = 7

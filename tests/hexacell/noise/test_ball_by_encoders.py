@@ -8,7 +8,7 @@ import pytest
 from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.noise.allowances import Allowances
-from hexacell.noise.approach_scatter import BallByEncoders
+from hexacell.noise.ball_by_encoders import BallByEncoders
 from hexacell.robot.model import robot_of
 from hexacell.robot.virtual_robot import VirtualRobot, robots_within_tolerances
 

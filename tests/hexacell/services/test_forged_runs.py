@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from hexacell.campaign.decisions import FIRST_PILOT
+from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.config.interface import ControllerLimits
 from hexacell.errors import FileError, HexacellError
 from hexacell.services.run.replay_run import replay

@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from hexacell.campaign.decisions import FIRST_PILOT
+from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.cell.devices import ThermometerSettings
 from procedures.journal.journal import Journal, read_journal
 from procedures.run.keys import Phase, SetKey

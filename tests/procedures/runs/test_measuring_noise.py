@@ -10,7 +10,7 @@ import pytest
 
 from drivers.errors import GaugeSilent
 from hexacell.campaign import planner
-from hexacell.campaign.decisions import FIRST_PILOT
+from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.cell.recovery import UnattendedRecovery
 from hexacell.errors import Interruption
 from hexacell.kinematics.pose import Pose

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from drivers.errors import PoseRefused
-from hexacell.campaign.decisions import FIRST_PILOT
+from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.cell.simulation import SoftLimits
 from hexacell.errors import ExitCode, IdentifiabilityError
 from hexacell.kinematics.pose import Pose

@@ -33,7 +33,7 @@ from hexacell.identification.placement import Placement
 from hexacell.identification.solver.measurement_model import NuisanceElimination
 from hexacell.identification.solver.result import Identification
 from hexacell.identification.solver.term_estimates import TermEstimates
-from hexacell.identification.terms.term import LegErrors, ModelTerm
+from hexacell.identification.terms.term import ErrorsOfSizes, ModelTerm
 from hexacell.kinematics.corrections import NO_CORRECTIONS, Corrections
 from hexacell.kinematics.parameters import LEGS, JointUnit
 from hexacell.kinematics.pose import PoseBatch
@@ -189,13 +189,13 @@ class Propagation:
         return self.frames.remove_frame_motion(self.task.poses, errors, effect.on_poses(self.workspace))
 
 
-def _at_every_stop(term: ModelTerm, on_either_side: LegErrors, sizes: Array) -> Effect:
+def _at_every_stop(term: ModelTerm, on_either_side: ErrorsOfSizes, sizes: Array) -> Effect:
     """A term of some sizes (6,) where nobody knows the side."""
     size = float(np.sqrt(np.mean(sizes**2))) / THOUSANDTH
     unit, at_work = JointUnit(term.unit).thousandth, Occurrence.STOPS_AT_WORK
 
     def columns(at: Placement) -> Array:
-        errors = on_either_side(at, np.zeros_like(at.joints)) * sizes / size
+        errors = on_either_side(at, np.zeros_like(at.joints), sizes) / size
         return np.asarray(at.by_constraints * errors[:, None, :])
 
     return Effect(f"{term.name} on either side", size, unit, at_work, columns, source="identified")

@@ -73,9 +73,13 @@ MACHINES_OF_A_KIND = {
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a machine: its true error, as stated, and which terms were taken."""
+    """What came of a machine: its true error, as stated, and which terms were taken.
+
+    ``loaded_mm`` is the true error at those task poses at which it is known on which side each leg lies.
+    """
 
     true_mm: float = np.nan
+    loaded_mm: float = np.nan
     value_mm: float = np.nan
     u_mm: float = np.nan
     verdict: Verdict | None = None
@@ -91,6 +95,20 @@ def sent_further(
     at = Placement(robot.mechanism, robot.commanding, poses, joints)
     errors = sum(term.leg_errors(at, came) * found.terms.of(term.name)[0] for term in found.terms.terms)
     return -at.as_joints(np.asarray(errors))
+
+
+def is_loaded(robot: Robot, found: Identification, poses: PoseBatch) -> Array:
+    """At which poses (n,) no leg may lie on either side of its play, by what was found."""
+    if found.terms is None:
+        return np.ones(len(poses), dtype=bool)
+    joints = robot.mechanism.inverse(found.geometry, robot.branch, poses)
+    at, terms = Placement(robot.mechanism, found.geometry, poses, joints), found.terms
+    either = [
+        term.on_either_side(at, np.ones_like(joints), terms.of(term.name)[0])
+        for term in terms.terms
+        if term.on_either_side is not None
+    ]
+    return ~np.any(either, axis=(0, 2)) if either else np.ones(len(poses), dtype=bool)
 
 
 def carried_out(machine: Machine, number: int) -> Outcome:
@@ -115,8 +133,10 @@ def carried_out(machine: Machine, number: int) -> Outcome:
     task = Task.of(own.cell.settings, after, belief).reachable(belief)
     errors = corrected.errors(found.geometry, task.poses, task.workspace, hour)
     accuracy = says.accuracy
+    at_loaded = np.linalg.norm(errors.once, axis=-1)[is_loaded(after, found, task.poses)]
     return Outcome(
         errors.largest_once_mm,
+        float(at_loaded.max(initial=0.0)),
         np.nan if accuracy is None else accuracy.position.value,
         np.nan if accuracy is None else accuracy.position.expanded,
         says.verdict,
@@ -138,6 +158,8 @@ def test_what_is_not_geometry_is_found_and_corrected(figure, perfect, kind: str)
     median, of_none = (np.nanmedian([one.true_mm for one in some]) for some in (every, perfect))
     figure("error if what was found is corrected", median, "mm")
     figure("over that of a machine without", median / of_none, "", at_most(machine.at_most))
+    at_loaded = np.nanmedian([one.loaded_mm for one in every])
+    figure("the same at poses that load every leg surely", at_loaded / of_none, "")
     figure("identified and judged", len(known), f"of {MACHINES}", at_least(MACHINES))
     passes = sum(one.verdict is Verdict.PASS for one in every)
     figure("passes", passes, f"of {MACHINES}")

@@ -125,9 +125,9 @@ class CorrectedFit:
         )
 
     def deletion_tests(self) -> dict[RecordId, DeletionTest]:
-        """Tests of all records that the fit does without, but for those after a zero shift."""
+        """Tests of all records that the fit does without, but for those that only a zero shift concerns."""
         shifted = {record for after in self.zero_shifts.values() for record in after}
-        return deletion_tests(self.original, self.fit, without=shifted)
+        return deletion_tests(self.original, self.fit, without=shifted - {*self.rejected})
 
     def only_for(self, faults: tuple[FaultHypothesis, ...]) -> CorrectedFit:
         """The fit of all records as measured after correction for some faults, from this solution."""

@@ -23,5 +23,5 @@ def _lagging(placement: Placement, directions: Array) -> Array:
     return np.asarray(-0.5 * placement.derivatives.joints * directions)
 
 
-def _where_unknown(placement: Placement, directions: Array) -> Array:
-    return np.where(directions == 0.0, 0.5 * placement.derivatives.joints, 0.0)
+def _where_unknown(placement: Placement, directions: Array, sizes: Array) -> Array:
+    return np.where(directions == 0.0, 0.5 * placement.derivatives.joints * sizes, 0.0)

@@ -24,11 +24,7 @@ def play(size_mm: float, direction: Array, centre_mm: Array | None = None) -> Mo
     """The play of each leg; where and whereto the weight acts as in :func:`.leg_forces`."""
     acts = direction, centre_mm
     return ModelTerm(
-        "play",
-        "mm",
-        size_mm,
-        partial(_on_one_side, *acts),
-        on_either_side=partial(_on_either_side, size_mm, *acts),
+        "play", "mm", size_mm, partial(_on_one_side, *acts), on_either_side=partial(_on_either_side, *acts)
     )
 
 
@@ -39,13 +35,13 @@ def _on_one_side(
 
 
 def _on_either_side(
-    size_mm: float, direction: Array, centre_mm: Array | None, placement: Placement, _directions: Array
+    direction: Array, centre_mm: Array | None, placement: Placement, _directions: Array, sizes_mm: Array
 ) -> Array:
     pulls = leg_forces(placement, direction, centre_mm) > 0.0
     either = np.zeros_like(pulls)
     for leg in range(LEGS):
-        for longer_mm in (-size_mm, size_mm):
+        for longer_mm in (-sizes_mm[leg], sizes_mm[leg]):
             moved = apply_twist(placement.poses, longer_mm * placement.by_constraints[:, :, leg])
             there = leg_forces(replace(placement, poses=moved), direction, centre_mm)
             either[:, leg] |= (there[:, leg] > 0.0) != pulls[:, leg]
-    return WRONG_SIDE * either
+    return np.asarray(WRONG_SIDE * either * sizes_mm)

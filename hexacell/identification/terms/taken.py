@@ -84,7 +84,7 @@ def _unknown_places(terms: tuple[ModelTerm, ...], records: RecordPlacement, valu
     for row, term in enumerate(terms):
         if term.on_either_side is not None:
             size = term.mean if values is None else values[row * LEGS : (row + 1) * LEGS]
-            errors = size * term.on_either_side(records, records.directions)
+            errors = term.on_either_side(records, records.directions, size)
             variance = variance + records.as_joints(errors) ** 2
     return variance
 

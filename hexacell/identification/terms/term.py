@@ -22,6 +22,9 @@ LegErrors = Callable[[Placement, Array], Array]
 """Errors of the constraints (n, 6), mm, by one unit of each leg's own coefficient, at n poses at which the
 joints arrived from some directions (n, 6)."""
 
+ErrorsOfSizes = Callable[[Placement, Array, Array], Array]
+"""Likewise by coefficients of some sizes (6,)."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelTerm:
@@ -46,7 +49,7 @@ class ModelTerm:
     leg_errors: LegErrors
     takes_up: str = ""
     needs_directions: bool = False
-    on_either_side: LegErrors | None = None
+    on_either_side: ErrorsOfSizes | None = None
     mean: Array = field(default_factory=lambda: np.zeros(LEGS))
     sigma: Array | None = None
 

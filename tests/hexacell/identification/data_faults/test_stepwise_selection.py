@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hexacell.identification.data_faults.corrected_fit import CorrectedFit
+from hexacell.identification.data_faults.hypotheses import OutlierHypothesis, ZeroShiftHypothesis
 from hexacell.identification.data_faults.units import wrong_unit
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import DataFaultKind, GaugeFaultError
@@ -203,3 +205,14 @@ def test_joint_variables_of_another_pose_are_recognized(noisy, make_problem):
     faults = identify(make_problem(MeasurementSet(tuple(records)))).data_faults
     assert [fault.kind for fault in faults] == [DataFaultKind.MISMATCHED_JOINTS] * 2
     assert [fault.left_out for fault in faults] == [(first.id,), (second.id,)]
+
+
+def test_a_false_record_after_a_zero_shift_is_tested_as_one(noisy, make_problem) -> None:
+    """It was left out for itself; records that only the shift concerns are not."""
+    problem = make_problem(noisy)
+    false = OutlierHypothesis(gain=100.0, unknowns=3, records=((2, 9),))
+    shift = ZeroShiftHypothesis(
+        gain=100.0, unknowns=3, point=2, orientation=4, shift=np.ones(3), significance=1.0
+    )
+    fit = CorrectedFit.uncorrected(problem).only_for((false, shift))
+    assert [*fit.deletion_tests()] == [(2, 9)]

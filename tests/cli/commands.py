@@ -37,26 +37,8 @@ def command(*arguments: object) -> list[str]:
     return [sys.executable, "-m", "hexacell", *map(str, arguments)]
 
 
-WITH_LITTLE_EFFORT = """
-import sys
-from hexacell.__main__ import main
-from hexacell.design.candidate_refinement import SearchEffort
-from hexacell import services
-services.EFFORT = SearchEffort(
-    candidates=64,
-    held_out_candidates=128,
-    checked_candidates=8,
-    checked_robots=4,
-    rounds=(),
-    late_rounds=(),
-)
-sys.exit(main())
-"""
-"""A run whose poses are chosen among few; which are chosen is not under test."""
-
-
 def run_of_little_effort(*arguments: object) -> list[str]:
-    return [sys.executable, "-c", WITH_LITTLE_EFFORT, *map(str, arguments)]
+    return [sys.executable, str(Path(__file__).with_name("little_effort.py")), *map(str, arguments)]
 
 
 def surroundings(temporary: Path) -> dict[str, str]:

@@ -1,0 +1,18 @@
+"""``hexacell`` with few choices of poses, a program of its own for tests in which poses do not matter."""
+
+import sys
+
+from hexacell import services
+from hexacell.__main__ import main
+from hexacell.design.search_effort import SearchEffort
+
+if __name__ == "__main__":
+    services.EFFORT = SearchEffort(
+        candidates=64,
+        held_out_candidates=128,
+        checked_candidates=8,
+        checked_robots=4,
+        rounds=(),
+        late_rounds=(),
+    )
+    sys.exit(main())

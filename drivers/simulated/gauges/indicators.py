@@ -1,23 +1,15 @@
 """Simulated indicators, multiplexers and display units; drivers send them nothing but questions."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
-from drivers.simulated.gauges.instruments import MM_PER_INCH, Indicator, Instrument, SingleIndicator
+from drivers.simulated.gauges.instruments import MM_PER_INCH, Instrument, SingleIndicator
 
 
 class Mux10(Instrument):
-    """A multiplexer with MUX-10 frames: answers a channel number with the value of its indicator.
-
-    It answers the next ``busy`` requests with an error.
-    """
+    """A multiplexer with MUX-10 frames: answers a channel number with the value of its indicator."""
 
     has_channels: ClassVar[bool] = True
     at_end: ClassVar[bytes] = b"912\r"
-
-    def __init__(self, indicators: Mapping[int, Indicator]) -> None:
-        super().__init__(indicators)
-        self.busy = 0
 
     def answer(self, command: bytes) -> bytes:
         """A data frame or an error; nothing if the command is no channel number and not ``V``."""
@@ -25,9 +17,6 @@ class Mux10(Instrument):
             return b"MUX-10F SIMULATED\r"
         if not command.isdigit():
             return b""
-        if self.busy:
-            self.busy -= 1
-            return b"918\r"
         indicator = self.indicators.get(int(command))
         return self._value(int(command)) if indicator and indicator.powered else b"911\r"
 

@@ -12,14 +12,6 @@ from tests.drivers.encoders.conftest import short_timeout
 from tests.waiting import until
 
 
-async def test_no_thread_outlives_a_failed_open(raw, short_timeout_bank):
-    before = set(threading.enumerate())
-    del raw.nodes[1]
-    with pytest.raises(BusError):
-        await short_timeout_bank.open()
-    assert set(threading.enumerate()) == before
-
-
 async def test_a_cancelled_read_returns_soon_and_the_next_one_is_right(raw, make_bank):
     bank = make_bank(timeout_s=3600.0)
     await bank.open()
@@ -104,9 +96,3 @@ async def test_a_bus_that_fails_is_an_error_with_its_cause(raw, opened, monkeypa
         )
         with short_timeout(opened), failed:
             await opened.read()
-
-
-async def test_any_error_of_the_bus_is_reported(raw, opened, monkeypatch):
-    monkeypatch.setattr(opened._session.bus.network.bus, "recv", lambda _timeout: 1 / 0)
-    with pytest.raises(BusError, match="division by zero"):
-        await opened.read()

@@ -5,17 +5,11 @@ import sys
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from drivers.errors import GaugeAtEnd
 from drivers.gauges.described import ModbusGauge
-from drivers.serial.shared_port import SharedSerialPorts
-from drivers.simulated.gauges.bank import instrument_class
 from drivers.simulated.gauges.described import crc
-from drivers.simulated.gauges.instruments import Indicator
 from hexacell.cell.described_devices import ModbusSettings
-from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError, UsageError
 from tests.drivers.simulated.gauges.served.cell import cell
 
@@ -96,18 +90,6 @@ async def test_a_number_that_means_an_end_is_told():
         made.rack.faults("x")["at its end"](on=True)
         with pytest.raises(GaugeAtEnd, match="gauge x: shows 2147483647, as at an end"):
             await made.gauges["x"].read()
-
-
-@given(st.integers(-(2**31), 2**31 - 1), st.sampled_from(["big", "little"]))
-def test_what_the_simulated_device_holds_is_understood(count, order):
-    found = ModbusSettings.model_validate({"register": 0, "word_order": order, "mm_per_unit": 1.0})
-    gauge = ModbusGauge(
-        GaugeSettings(name="x", axis="x", protocol="modbus", modbus=found), SharedSerialPorts()
-    )
-    indicator = Indicator(lambda: float(count), travel_mm=1e10)
-    twin = instrument_class("modbus")({1 << 16: indicator}, found)
-    request = bytes.fromhex("01 04 00 00 00 02")
-    assert gauge._parse_value(twin.answer(request + crc(request))[3:-2]).value == count
 
 
 async def test_without_the_extra_the_command_that_installs_it_is_told(monkeypatch):

@@ -1,20 +1,13 @@
 """Gauges that are described in the cell file alone: that are asked, and that send by themselves."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer
 from drivers.gauges.described import ModbusGauge, RequestGauge, StreamGauge
-from drivers.gauges.streaming import Origin
 from drivers.gauges.visa import VisaGauge
 from drivers.interfaces import GaugeReading
-from drivers.serial.shared_port import SharedSerialPorts
-from drivers.simulated.gauges.bank import instrument_class
-from drivers.simulated.gauges.instruments import Indicator
 from hexacell.cell.described_devices import ModbusEncoderSettings, RequestSettings, StreamSettings
-from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import FileError
 
 ID_H = {
@@ -96,18 +89,6 @@ def test_descriptions_that_cannot_be_are_refused(section, stated):
         section.model_validate(stated)
 
 
-@given(st.floats(-6.0, 6.0), st.sampled_from([ID_H, AMPLIFIER]))
-def test_what_the_simulated_gauge_answers_is_understood(value, description):
-    request = RequestSettings(**description)
-    twin = instrument_class("request")({1: Indicator(lambda: value)}, request)
-    settings = GaugeSettings(name="x", axis="x", protocol="request", port="wire", request=request)
-    shown = RequestGauge(settings, SharedSerialPorts())._parse_value(
-        twin.answer(request.ask.rstrip("\r\n").encode())
-    )
-    assert shown.value == pytest.approx(value, abs=0.51e-4)
-    assert shown.decimals == 4
-
-
 CALIPER = {"answer": r"([+-]\d{3}\.\d{2}) mm", "example": "+012.34 mm\r\n", "at_end": "----"}
 """What many microcontrollers make of Digimatic."""
 
@@ -155,15 +136,3 @@ async def test_a_stream_that_stops_names_the_gauge(line, sender):
     line.stops()
     with pytest.raises(GaugeSilent, match=r"gauge y: sends nothing for 0\.05 s on port wire"):
         await sender.check()
-
-
-@given(st.floats(-6.0, 6.0), st.integers(1, 99), st.sampled_from([CALIPER, RECEIVER]))
-def test_what_the_simulated_gauge_sends_is_understood(value, channel, description):
-    described = StreamSettings(**description)
-    [frame] = instrument_class("stream")({channel: Indicator(lambda: value)}, described).unasked()
-    gauge = StreamGauge(
-        GaugeSettings(name="x", axis="x", protocol="stream", channel=channel, stream=described),
-        SharedSerialPorts(),
-    )
-    assert gauge._origin(frame.strip()) is Origin.OWN
-    assert gauge._parse_value(frame.strip()).value == pytest.approx(value, abs=0.0051)

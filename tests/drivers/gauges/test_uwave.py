@@ -1,15 +1,12 @@
 """Mitutoyo U-WAVE-R on a line where nobody asks: captured frames, freshness, channels, faults."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from drivers.errors import EmptyChannel, GaugeSilent
 from drivers.gauges.uwave import UwaveGauge, channel_of
 from drivers.interfaces import GaugeReading
 from drivers.serial.opening import SLICE_S
 from drivers.serial.shared_port import SharedSerialPorts
-from drivers.simulated.gauges.indicators import Uwave
 from hexacell.cell.devices import GaugeSettings
 
 DELAY_S = 0.02
@@ -51,14 +48,6 @@ def test_frames_that_were_captured_are_read(frame, value, decimals):
 )
 def test_what_is_no_whole_value_is_none(frame):
     assert channel_of(frame) is None
-
-
-@given(st.floats(-99, 99), st.integers(0, 9999), st.booleans())
-def test_what_the_simulated_receiver_sends_is_understood(value, channel, inch):
-    frame = Uwave.format_value(channel, value, inch=inch).rstrip(b"\r")
-    gauge = UwaveGauge(GaugeSettings(name="x", axis="x", protocol="uwave"), SharedSerialPorts())
-    assert channel_of(frame) == channel
-    assert gauge._parse_value(frame).value == pytest.approx(value, abs=0.51e-5 if inch else 0.51e-3)
 
 
 async def test_opening_and_reading_take_what_comes(line, dialogue, gauge):

@@ -1,6 +1,5 @@
 """Faults of a simulated cell, injected at once and on schedule."""
 
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -19,26 +18,6 @@ def cell(bundled_cell):
     gauges = tuple(gauge.model_copy(update={"protocol": "sylvac"}) for gauge in settings.gauges)
     with served(bundled_cell, settings.model_copy(update={"gauges": gauges})) as simulated:
         yield simulated
-
-
-def test_the_stop_line_is_a_file(cell) -> None:
-    stop_file = Path(cell.settings.guards.stop_file)
-    cell.faults.inject("stop line")
-    assert stop_file.exists()
-    cell.faults.clear("stop line")
-    assert not stop_file.exists()
-    cell.faults.clear("stop line")
-
-
-def test_an_emergency_stop_and_a_following_error_switch_the_machine_off(cell) -> None:
-    control = cell.controller.state
-    for kind, estop in (("following error", False), ("emergency stop", True)):
-        control.set_estop(on=False)
-        control.set_machine(on=True)
-        assert control.enabled
-        cell.faults.inject(kind)
-        assert (control.enabled, control.estop) == (False, estop)
-    assert control.next_error() == "joint 3 following error"
 
 
 @pytest.mark.parametrize(

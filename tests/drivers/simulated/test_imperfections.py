@@ -25,7 +25,6 @@ from hexacell.kinematics.parameters import ParameterSet
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from tests.drivers.simulated.conftest import STILL, StillClock, changed
-from tests.geometries import gough_stewart_geometry
 
 CELLS = ("simulated-hexaglide", "gough-stewart", "linapod", "rotary-cranks")
 COMPLIANCE = (0.1, 0.3, 0.2, 0.25, 0.15, 0.35)
@@ -173,44 +172,6 @@ def longer_by(machine: Machine, row: int, poses: PoseBatch) -> Array:
     return np.asarray(after - before)
 
 
-HALF_BASE, HALF_PLATFORM = np.radians(20.0), np.radians(40.0)
-
-
-def symmetric() -> tuple[GoughStewart, Geometry, PoseBatch, Array]:
-    """A platform whose legs are mirror images of each other, at a height at which they all are 45 deg."""
-
-    def ring(radius: float, half: float, height: float) -> Array:
-        angles = np.radians([0.0, 0.0, 120.0, 120.0, 240.0, 240.0]) + np.tile([-half, half], 3)
-        return np.stack([radius * np.cos(angles), radius * np.sin(angles), np.full(6, height)], axis=1)
-
-    base, platform = ring(500.0, HALF_BASE, 0.0), ring(250.0, HALF_PLATFORM, -100.0)
-    across = float(np.linalg.norm((base - platform)[0, :2]))
-    pose = PoseBatch.of([Pose(0.0, 0.0, across + 100.0)])
-    geometry = gough_stewart_geometry(base, platform, np.full(6, np.sqrt(2.0) * across))
-    return GoughStewart(), geometry, pose, np.zeros((1, 6))
-
-
-def symmetric_machine(mechanism: GoughStewart, geometry: Geometry, **changes: Any) -> LoadedMachine:
-    settings = load_cell(bundled_config("gough-stewart")).settings.simulation
-    assert settings is not None
-    keys = {key.replace("__", "."): value for key, value in changes.items()}
-    return LoadedMachine(mechanism, geometry, changed(settings, keys))
-
-
-def test_a_symmetric_platform_sinks_straight_by_what_each_leg_yields() -> None:
-    mechanism, geometry, pose, joints = symmetric()
-    load = SimulatedLoad(weight_n=120.0)
-    each = -120.0 / 6.0 * np.sqrt(2.0)
-    assert leg_tensions(mechanism, geometry, pose, joints, load) == pytest.approx(np.full((1, 6), each))
-    machine = symmetric_machine(mechanism, geometry, legs__compliance_um_n=0.5, load__weight_n=120.0)
-    sunk = machine.pose(joints[0], 0.0, pose).poses
-    length = float(geometry["offset"][0])
-    height = np.sqrt((length + 0.5e-3 * each) ** 2 - 0.5 * length**2)
-    # By 1e-4 of it legs are steeper or flatter then, and their forces others.
-    assert sunk.positions[0] == pytest.approx([0.0, 0.0, height + 100.0], abs=1e-5)
-    assert sunk.rotations[0] == pytest.approx(np.eye(3), abs=1e-9)
-
-
 def test_a_mechanism_without_lengths_does_the_same_by_its_joints() -> None:
     class NoLengths(GoughStewart):
         kinds = GOUGH_STEWART_PARAMETERS.kinds
@@ -218,13 +179,14 @@ def test_a_mechanism_without_lengths_does_the_same_by_its_joints() -> None:
             (*kinds[:2], *(_of_no_part(kind) for kind in kinds[2:])), has_branch=False
         )
 
-    changes = {"legs__compliance_um_n": COMPLIANCE, "legs__play_mm": PLAY, "load__weight_n": 50.0}
-    mechanism, geometry, pose, joints = symmetric()
-    expected = symmetric_machine(mechanism, geometry, **changes).pose(joints[0], 0.0, pose).poses
-    other = Geometry(NoLengths.parameters, geometry.vector)
-    seen = symmetric_machine(NoLengths(), other, **changes).pose(joints[0], 0.0, pose).poses
-    assert seen.positions == pytest.approx(expected.positions, abs=1e-8)
-    assert np.linalg.norm(seen.positions - pose.positions) > 1e-3
+    machine = Machine(
+        "gough-stewart", legs__compliance_um_n=COMPLIANCE, legs__play_mm=PLAY, load__weight_n=50.0
+    )
+    expected = machine.loaded(1).positions
+    machine.mechanism = NoLengths()
+    machine.geometry = Geometry(NoLengths.parameters, machine.geometry.vector)
+    assert machine.loaded(1).positions == pytest.approx(expected, abs=1e-8)
+    assert np.linalg.norm(expected - machine.poses.positions[1]) > 1e-3
 
 
 def _of_no_part(kind: Any) -> Any:
@@ -303,16 +265,3 @@ def test_all_of_them_together_add_up_in_the_lengths_of_the_legs() -> None:
     ends = pose.positions[0] + warm["platform"] @ pose.rotations[0].T
     lengths = np.linalg.norm(ends - warm["base"], axis=1)
     assert lengths == pytest.approx(warm["offset"] + joints[0] + longer, abs=1e-7)
-
-
-def test_six_sliders_with_the_same_backlash_move_the_platform_by_it(make_twin) -> None:
-    """All rails of a Hexaglide point along x: so does the way that is lost."""
-    twin = make_twin(station_reach_mm=1e6, joints__backlash_mm=0.08)
-    start = twin.physics.encoder_positions()
-    seen = []
-    for way in (-2.0, 2.0):
-        for path in ([start, start + way], [start + way, start]):
-            twin.physics.start_motion(np.stack(path))
-            twin.clock.time_s += 10.0
-        seen.append(twin.seen())
-    assert seen[1] - seen[0] == pytest.approx([0.08, 0.0, 0.0], abs=1e-9)

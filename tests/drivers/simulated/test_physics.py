@@ -1,12 +1,9 @@
 """The true state of the simulated robot: motions, positions, sensors with noise, places of the gauges."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from drivers.simulated.physics import GaugePlaces, Motion
 from hexacell.cell.bundled import bundled_config
@@ -43,12 +40,6 @@ def test_the_ball_is_where_the_true_geometry_puts_it(make_twin) -> None:
     for pose in POSES:
         go(twin, pose)
         assert twin.seen() - seen == pytest.approx(twin.ball_at(pose) - reference, abs=1e-6)
-
-
-def test_sliders_follow_the_controllers_geometry(twin) -> None:
-    for pose in POSES:
-        go(twin, pose)
-        assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(pose), abs=1e-9)
 
 
 def test_a_move_takes_the_time_of_its_longest_slider(make_twin) -> None:
@@ -191,14 +182,6 @@ def test_a_motion_is_linear_between_rows_of_the_path(motion: Motion) -> None:
     assert 1.0 < place < 2.0
     expected = PATH[1] + (place - 1.0) * (PATH[2] - PATH[1])
     assert motion.joints(13.0) == pytest.approx(expected)
-
-
-@given(stopped=st.floats(10.0, 14.0), later=st.floats(0.0, 100.0))
-def test_a_stopped_motion_stays_at_its_position(stopped: float, later: float) -> None:
-    motion = Motion(PATH, start_s=10.0, duration_s=4.0)
-    halted = replace(motion, stopped_s=stopped)
-    assert halted.end_s == stopped
-    assert np.array_equal(halted.joints(stopped + later), motion.joints(stopped))
 
 
 FIXTURE = LengthCheckSettings(

@@ -24,18 +24,6 @@ def rewrite(twin: Any, geometry: Geometry) -> None:
     twin.config.write_text(native_layout(HEXAGLIDE_PARAMETERS).rewrite([text], geometry)[0])
 
 
-def test_the_pose_during_a_move_is_between_start_and_end(twin) -> None:
-    seen: list[Pose] = []
-
-    def look() -> None:
-        twin.clock.time_s += 0.15  # half of the shortest move
-        seen.append(twin.machine.pose())
-
-    twin.clock.on_wait = look
-    twin.machine.move(Pose(4.0, 0.0, 550.0, 0.0, 0.0, 2.0))
-    assert seen[0].as_tuple() == pytest.approx((2.0, 0.0, 550.0, 0.0, 0.0, 1.0), abs=1e-6)
-
-
 def test_moves_are_straight(twin) -> None:
     """At every piece of the line the sliders are where the geometry puts them for that pose."""
     paths: list[Any] = []

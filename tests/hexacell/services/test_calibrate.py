@@ -80,6 +80,7 @@ async def test_the_cell_is_held_while_it_runs_and_free_afterwards(make_site, fin
     assert refusal.value.exit_code is ExitCode.BUSY
     await site.calibrate(listener, resume=True)
     assert busy == [True]
+    assert site.config == finished.cell.config_path.read_bytes()
     with cell_lock(site.cell.config_path):
         pass
 

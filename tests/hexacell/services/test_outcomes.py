@@ -45,12 +45,6 @@ def proposed(finished, make_site) -> Callable[..., Any]:
     return make
 
 
-async def test_a_run_resumed_from_its_proposal_writes_the_config(proposed, finished) -> None:
-    site = proposed()
-    assert (await site.calibrate(resume=True)).exit_code == ExitCode.DONE
-    assert site.config == finished.cell.config_path.read_bytes()
-
-
 async def test_what_rests_on_an_expired_certificate_needs_a_person(finished, make_site) -> None:
     first, *others = finished.cell.settings.gauges
 

@@ -110,18 +110,6 @@ def test_its_residuals_are_judged_by_what_was_known_before(corrected) -> None:
     assert all(gate.passed for gate in state.proposed.gates)
 
 
-async def test_the_next_check_starts_from_it(corrected) -> None:
-    cell = corrected.cell
-    folder = RunFolder(runs_folder(cell) / "check")
-    ended = await calibrate(order_of(cell, folder, mode=Mode.CHECK))
-    assert ended.exit_code == ExitCode.DONE
-    state = fold(read_journal(folder.journal))
-    assert state.judged is not None
-    assert state.judged.check is not None
-    assert state.judged.check.drift_scale == 1.0
-    assert state.judged.check.earlier_run == str(corrected.folder.path)
-
-
 def test_what_effects_did_to_the_result_before_counts(corrected) -> None:
     """An encoder that reads long did so in the calibration as well: its records do not average that."""
     cell, state = corrected.cell, corrected.state

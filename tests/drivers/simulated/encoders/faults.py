@@ -2,7 +2,6 @@
 
 import struct
 from dataclasses import replace
-from functools import partial
 
 from drivers.simulated.encoders.bank import SimulatedEncoderBank
 from drivers.simulated.encoders.node import SimulatedEncoder
@@ -22,15 +21,3 @@ def set_alarms(bank: SimulatedEncoderBank, leg: int, bits: int = 1) -> None:
     """The node sets alarms in 6503h without a message; 0 clears them."""
     with bank.bus.lock:
         bank._encoders[leg - 1]._node.set_data(ALARMS, 0, struct.pack("<H", bits))
-
-
-def delay(bank: SimulatedEncoderBank, leg: int, seconds: float) -> None:
-    """The responses of the node are delayed; they keep the sample of their SYNC."""
-    encoder = bank._encoders[leg - 1]
-    send = encoder.send
-
-    def send_later(cob_id: int, data: bytes) -> None:
-        bank.bus.call_later(seconds, partial(send, cob_id, data))
-
-    with bank.bus.lock:
-        encoder.send = send_later  # type: ignore[method-assign]

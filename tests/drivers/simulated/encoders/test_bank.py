@@ -6,13 +6,9 @@ from functools import partial
 import pytest
 
 from drivers.errors import BusError
-from drivers.interfaces import EncoderSample
 from drivers.simulated.encoders.object_dictionary import EVENTS_AND_SYNC
 from drivers.simulated.serial_line import PtyLine, SocketLine
 from drivers.simulated.slcan import SlcanServer
-from hexacell.errors import DeviceError
-from tests.drivers.encoders.conftest import short_timeout
-from tests.drivers.simulated.encoders import faults
 from tests.drivers.simulated.encoders.conftest import EVENTS_ONLY, TWO_MAGNETS
 from tests.waiting import until
 
@@ -24,19 +20,6 @@ async def test_rounds_are_complete_and_of_one_instant(make_bank, reach, driver, 
     before = samples.taken
     rounds = [(await bank.read()).counts for _ in range(100)]
     assert rounds == [(count,) * 6 for count in range(before + 1, before + 101)]
-
-
-@pytest.mark.parametrize("vendor", [EVENTS_AND_SYNC, EVENTS_ONLY, TWO_MAGNETS])
-async def test_every_vendor_is_configured_to_one_sample_per_sync(make_bank, driver, listen, vendor):
-    simulated = make_bank(vendors=(vendor,) * 6)
-    bank = driver(simulated.bus_settings)
-    identities = await bank.open()
-    assert [identity.serial_number for identity in identities] == [str(1001 + leg) for leg in range(6)]
-    ear = listen(simulated)
-    positions = [await bank.read() for _ in range(3)]
-    assert all(len(set(each.counts)) == 1 for each in positions)
-    tpdos = [can_id for can_id, _ in ear.heard() if 0x180 <= can_id < 0x580]
-    assert len(tpdos) == 18
 
 
 @pytest.mark.parametrize(
@@ -57,23 +40,6 @@ async def test_positions_come_back_within_half_a_step(make_bank, driver, setting
     await bank.open()
     found = (await bank.read()).positions
     assert found == pytest.approx(positions, abs=changed.measuring_step_nm * 0.5e-6 + 1e-9)
-
-
-@pytest.mark.parametrize("timeouts", [0.5, 1.4, 2.5, 4.5])
-async def test_late_answers_are_never_mixed_with_later_samples(make_bank, driver, timeouts):
-    """Leg 3 answers every SYNC that much later, with what it saw at that SYNC."""
-    simulated = make_bank()
-    bank = driver(simulated.bus_settings)
-    await bank.open()
-    faults.delay(simulated, 3, timeouts * 0.08)
-    for _ in range(2):
-        with short_timeout(bank, 0.08):
-            outcome = (await asyncio.gather(bank.read(), return_exceptions=True))[0]
-        if isinstance(outcome, DeviceError):
-            assert "leg 3" in str(outcome)
-        else:
-            assert isinstance(outcome, EncoderSample)
-            assert len(set(outcome.counts)) == 1
 
 
 @pytest.mark.parametrize("line", [partial(PtyLine, "slcan"), SocketLine], ids=["pty", "socket"])

@@ -7,62 +7,6 @@ import pytest
 from drivers.simulated.gauges.indicators import Cdi, Mux10, Sylvac
 from drivers.simulated.gauges.instruments import Indicator, Instrument
 
-
-class Ball:
-    """A plunger position that tests change."""
-
-    position = 2.138
-
-    def __call__(self) -> float:
-        return self.position
-
-
-@pytest.fixture
-def ball() -> Ball:
-    return Ball()
-
-
-@pytest.fixture
-def indicator(ball: Ball) -> Indicator:
-    return Indicator(ball, travel_mm=12.5)
-
-
-@pytest.mark.parametrize(
-    ("position", "shown"), [(6.25, 6.25), (-6.25, -6.25), (0.0, 0.0), (6.26, None), (-6.26, None)]
-)
-def test_a_position_within_the_travel_is_shown(indicator, ball, position, shown):
-    ball.position = position
-    assert indicator.shown() == shown
-
-
-def test_a_held_value_is_shown_even_outside_the_travel(indicator, ball):
-    indicator.set_hold(on=True)
-    ball.position = 99.0
-    assert indicator.shown() == 2.138
-    indicator.set_hold(on=False)
-    assert indicator.shown() is None
-
-
-def test_inch_reversal_and_zero_combine(indicator, ball):
-    indicator.reversed = True
-    assert indicator.shown() == -2.138
-    indicator.set_zeroed(on=True)
-    indicator.inch = True
-    assert indicator.shown() == pytest.approx(0.0)
-    ball.position += 2.54
-    assert indicator.shown() == pytest.approx(-0.1)
-
-
-def test_switching_on_again_loses_zero_and_hold(indicator, ball):
-    indicator.set_hold(on=True)
-    indicator.powered = False
-    indicator.switch_on()
-    assert indicator.powered
-    assert indicator.shown() == 0.0
-    ball.position += 1.0
-    assert indicator.shown() == pytest.approx(1.0)
-
-
 INCH, OFF, AT_END = {"inch": True}, {"powered": False}, {"is_at_end": True}
 ANSWERS: list[tuple[type[Instrument], dict[str, Any], bytes, bytes]] = [
     (Sylvac, {}, b"?", b"+2.138\r"),
@@ -108,13 +52,8 @@ ANSWERS: list[tuple[type[Instrument], dict[str, Any], bytes, bytes]] = [
 
 
 @pytest.mark.parametrize(("instrument", "state", "question", "answer"), ANSWERS)
-def test_it_answers_as_its_manual_says(indicator, instrument, state, question, answer):
+def test_it_answers_as_its_manual_says(instrument, state, question, answer):
+    indicator = Indicator(lambda: 2.138, travel_mm=12.5)
     for name, value in state.items():
         setattr(indicator, name, value)
     assert instrument({1: indicator}).answer(question) == answer
-
-
-def test_a_multiplexer_is_busy_for_the_number_of_requests_that_is_set(indicator):
-    mux10 = Mux10({1: indicator})
-    mux10.busy = 2
-    assert [mux10.answer(b"1") for _ in range(3)] == [b"918\r", b"918\r", b"01A+0002.138\r"]

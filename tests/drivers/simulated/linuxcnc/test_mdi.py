@@ -11,15 +11,6 @@ from hexacell.kinematics.pose import Pose
 HERE = Pose(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 
 
-@given(st.builds(Pose, *[st.floats(-1e4, 1e4)] * 6), st.floats(0.1, 1e4))
-def test_blocks_written_by_the_driver_are_parsed(pose, duration_s):
-    parsed = parse_block(timed_move(pose, duration_s), HERE)
-    assert parsed.target is not None
-    assert parsed.target.as_tuple() == pytest.approx(pose.as_tuple(), abs=1e-8)
-    assert parsed.duration_s == pytest.approx(duration_s, rel=1e-4)
-    assert parsed.modes == ModalState(1, 93, 0.0)
-
-
 @pytest.mark.parametrize("modes", [ModalState(), ModalState(1, 94, 250.0), ModalState(80, 93)])
 def test_the_driver_restores_the_modes_of_before(modes):
     moved = parse_block(timed_move(HERE, 1.0), HERE, modes)

@@ -73,6 +73,8 @@ def test_a_service_leaves_a_run_the_time_that_the_cell_file_gives_it(schedule, c
         assert f"TimeoutStartSec={longest}min\n" in service
         assert f"StartLimitBurst={tries}\n" in service
         cell_folder.edit((f"{given}{stated}\n", given))
+    refused = schedule("--daily", "09:30")
+    assert (refused.code, "09:30 is in the quiet hours of the cell" in refused.err) == (2, True)
     cell_folder.edit((given, f"{given}longest_minutes = 1430\n"))
     refused = schedule("--daily", "02:30")
     assert (refused.code, "it may last longer than a day" in refused.err) == (2, True)

@@ -88,19 +88,3 @@ def test_a_signal_ends_the_waiting(start, short_cell) -> None:
     process = start("run", short_cell.cell, "--unattended")
     process.wait_for("tried again in", lambda: process.err)
     assert process.stopped(signal.SIGTERM).code == ExitCode.INTERRUPTED
-
-
-def test_a_schedule_leaves_the_run_its_window(typed_here, short_cell, tmp_path) -> None:
-    stated(short_cell, 'quiet_hours = ["05:30-22:00"]\nwindow_minutes = 60\nlongest_minutes = 90.5')
-    units = tmp_path / "units"
-    written = typed_here("schedule", short_cell.cell, "--daily", "02:30", "--folder", units)
-    assert written.code == 0, written.err
-    said = " ".join(written.out.split())
-    assert "is tried again every 10 minutes, for 60 minutes" in said
-    assert "longer than 90.5 minutes goes back to its reference and ends" in said
-    [service] = units.glob("*.service")
-    assert "TimeoutStartSec=180min" in service.read_text()
-    assert "Restart=" not in service.read_text()
-    refused = typed_here("schedule", short_cell.cell, "--daily", "05:30", "--folder", units)
-    assert refused.code == ExitCode.USAGE
-    assert "05:30 is in the quiet hours of the cell" in refused.err

@@ -16,7 +16,6 @@ from hexacell.services.run.calibration_run import calibrate
 from hexacell.services.run.replay_run import replay
 from hexacell.verdict.decision import Verdict
 from procedures.calibration.calibration import Mode
-from procedures.devices.settling import trimmed_mean
 from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase
 from procedures.run.state import fold
@@ -45,14 +44,6 @@ def test_the_first_event_has_the_inputs_of_the_run(finished) -> None:
     protocols = [device.protocol for device in started.devices]
     assert protocols == ["sylvac", "mux10", "cdi", *["cia406"] * 6, "linuxcncrsh"]
     assert len({device.serial_number for device in started.devices if device.protocol == "cia406"}) == 6
-
-
-def test_raw_readings_are_what_the_devices_sent(finished) -> None:
-    samples = fold(finished.history).samples(Phase.IDENTIFY)
-    for sample in samples:
-        sent = trimmed_mean(np.asarray(sample.reading.counts) * 0.001)
-        assert sent == pytest.approx(np.asarray(sample.reading.joints), abs=1e-6)
-        assert all(len(answer) == 3 and all(answer) for answer in sample.reading.answers)
 
 
 async def test_a_folder_with_a_run_takes_no_new_one_and_what_is_over_is_not_resumed(finished) -> None:

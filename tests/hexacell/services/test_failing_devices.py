@@ -16,7 +16,6 @@ from procedures.calibration.calibration import Mode
 from procedures.devices.reconnection import DeviceReplaced
 from procedures.engine.engine import Listener
 from procedures.replay.replayer import Scope
-from procedures.run.trips import RobotNotStopped
 from procedures.steps import events
 
 UNPLUGGED: FaultKind = "unplugged"
@@ -74,22 +73,6 @@ async def test_an_unplugged_device_that_is_plugged_in_again_is_recovered(
     assert all(failure.action is not Action.ABORT for failure in failures)
     voided = [str(event.at) for event in site.happened(events.SetInvalidated)]
     assert ("P2" in voided) == voids, "what was opened again has lost its zero"
-
-
-async def test_a_robot_that_cannot_be_stopped_ends_the_run_without_recovery(at_second_point) -> None:
-    """Whatever the policy: the robot may still move. Once it is plugged in, the run can be resumed."""
-    site = at_second_point
-
-    def pull(event: events.Event, _: object) -> None:
-        if isinstance(event, events.StepBegun) and event.step.key == "P2/o03/move":
-            site.simulated.faults.inject(UNPLUGGED, "controller")
-
-    with pytest.raises(RobotNotStopped, match="controller"):
-        await site.calibrate(pull, resume=True)
-    assert not site.happened(events.Failed)
-    site.simulated.faults.clear(UNPLUGGED, "controller")
-    with pytest.raises(Enough):
-        await site.calibrate(enough(events.RecordTaken), resume=True)
 
 
 async def test_another_device_than_the_run_was_begun_with_is_refused(finished, make_site) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from hexacell.cell.fields import CertificateSettings
 from hexacell.cell.simulation import SimulatedFault
-from hexacell.errors import AnswerNeeded, DeviceError, ExitCode, WriteBackUndone
+from hexacell.errors import AnswerNeeded, DeviceError, ExitCode
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.robot.model import robot_of
@@ -96,36 +96,6 @@ async def test_a_better_result_that_held_out_records_contradict_is_rolled_back_b
     assert "rolled back, the controller has its old config" in ended.line
     assert site.config == finished.config_before
     assert site.simulated.machine._geometry.geometry.largest_difference(_drawing(site)) == 0.0
-
-
-async def test_a_failed_reload_restores_the_config_and_the_controller(proposed, finished, tmp_path) -> None:
-    first_time = tmp_path / "tried"
-    once = f"test -e {first_time} || {{ touch {first_time}; exit 1; }}"
-    site = proposed(controller__reload_command=("sh", "-c", once))
-    with pytest.raises(WriteBackUndone, match=r"its config is restored$") as undone:
-        await site.calibrate(resume=True)
-    assert undone.value.exit_code is ExitCode.WRITE_BACK_UNDONE
-    assert site.config == finished.config_before
-    assert site.simulated.controller.state.enabled
-    assert site.simulated.machine._geometry.geometry.largest_difference(_drawing(site)) == 0.0
-    assert not site.happened(events.Committed)
-
-
-async def test_gauges_set_to_inches_stop_the_run_and_are_all_named(make_site) -> None:
-    site = make_site()
-
-    def press_both_keys() -> None:
-        for name in "xz":
-            site.simulated.gauges.indicators[name].inch = True
-
-    both = r"(?s)gauge x: .*gauge z: answers in inch\. Press its in/mm key"
-    with pytest.raises(DeviceError, match=both) as refusal:
-        await site.calibrate(at(events.RecordTaken, press_both_keys))
-    assert refusal.value.exit_code is ExitCode.HARDWARE
-    (interrupted,) = site.happened(events.Interrupted)
-    assert interrupted.exit_code == ExitCode.HARDWARE
-    assert "answers in inch" in interrupted.reason
-    assert b"z" in site.folder.wire.read_bytes()
 
 
 async def test_an_emergency_stop_during_a_move_stops_the_run_and_is_not_reset(make_site) -> None:

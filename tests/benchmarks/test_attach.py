@@ -1,6 +1,5 @@
 """How soon a run in a process of its own can be left, whatever it is doing."""
 
-import shutil
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -8,8 +7,7 @@ from typing import Any
 
 import pytest
 
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import Cell, load_cell
+from hexacell.cell.loader import Cell
 from hexacell.run_process.client import start_host
 from hexacell.run_process.messages import EventRecorded, HostMessage
 from hexacell.run_process.run_socket import socket_path
@@ -21,6 +19,7 @@ from procedures.steps.move import Move
 from procedures.steps.sample import Sample
 from tests.benchmarks.figures import at_most
 from tests.cli.test_host import hosts_of
+from tests.hexacell.services.proposed_runs import a_cell
 from tests.waiting import until
 
 QUIT_S = 0.5
@@ -30,10 +29,7 @@ QUIT_S = 0.5
 @pytest.fixture
 def cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Cell:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    source = load_cell(bundled_config("simulated-hexaglide"))
-    for path in (source.path, source.config_path):
-        shutil.copy(path, tmp_path)
-    return load_cell(tmp_path / source.path.name)
+    return a_cell(tmp_path)
 
 
 def is_step(kind: type[Any], word: str = "") -> Callable[[HostMessage], bool]:

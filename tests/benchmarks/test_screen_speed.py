@@ -1,13 +1,9 @@
 """How soon the technician's screen shows live readings, answers a key, and is gone, whatever goes on."""
 
-import asyncio
 import os
 import pty
 import re
 import select
-import shutil
-import signal
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -18,17 +14,12 @@ from statistics import median
 
 import pytest
 
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import load_cell
-from hexacell.run_process.client import connect_to_run
-from hexacell.run_process.run_socket import socket_path
 from procedures.journal.journal import read_journal
 from procedures.steps import events
 from tests.benchmarks.figures import Figures, at_most
 from tests.benchmarks.samples import sample
-from tests.waiting import wait_until
+from tests.screen.served_cell import NAME, served_in
 
-NAME = "simulated-hexaglide"
 LIVE_S, KEY_S, QUIT_S = 1.5, 0.1, 0.5
 RUNS = sample(__name__, "RUNS")
 ROUNDS = 8
@@ -39,21 +30,8 @@ READING = rb"\d\.\d{4}.{0,20}mm"
 
 @pytest.fixture
 def served(tmp_path: Path) -> Iterator[Path]:
-    for name in (f"{NAME}.toml", f"{NAME}.controller.toml"):
-        shutil.copy(bundled_config(NAME).with_name(name), tmp_path)
-    path = tmp_path / "served.toml"
-    command = [sys.executable, "-m", "hexacell", "simulate", f"{NAME}.toml", "--output", str(path)]
-    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL) as process:
-        wait_until(path.exists)
+    with served_in(tmp_path) as path:
         yield path
-        asyncio.run(end_run(path))
-        process.send_signal(signal.SIGINT)
-
-
-async def end_run(path: Path) -> None:
-    """End the run that goes on, if one does."""
-    if (run := await connect_to_run(socket_path(load_cell(path)))) is not None:
-        await run.leave(keep_running=False)
 
 
 @dataclass

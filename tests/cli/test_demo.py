@@ -15,6 +15,7 @@ from hexacell.errors import Interruption
 from hexacell.runs.cell_lock import cell_lock
 from procedures.run.keys import Phase
 from procedures.steps import events
+from tests.cli.cell_folder import CellFolder
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 MEASURED_TWICE = 6
@@ -178,16 +179,8 @@ def earlier(tmp_path: Path) -> Path:
     return folder
 
 
-def contents(folder: Path) -> dict[Path, bytes | None]:
-    return {
-        path: path.read_bytes() if path.is_file() else None
-        for path in folder.rglob("*")
-        if not path.name.endswith(".hexacell-lock")
-    }
-
-
 def test_an_earlier_demo_stays_if_the_cell_is_unknown_or_it_still_runs(typed_here, earlier):
-    before = contents(earlier)
+    before = CellFolder(earlier).snapshot()
     for name in ("nope", "simulated-hexaglide.controller"):
         outcome = typed_here("demo", "--config", name)
         assert (outcome.code, f"no cell called '{name}' comes with hexacell" in outcome.err) == (2, True)
@@ -195,7 +188,7 @@ def test_an_earlier_demo_stays_if_the_cell_is_unknown_or_it_still_runs(typed_her
         outcome = typed_here("demo")
     assert outcome.code == 5
     assert f"in use by process {os.getpid()} " in outcome.err
-    assert contents(earlier) == before
+    assert CellFolder(earlier).snapshot() == before
 
 
 def test_an_earlier_demo_is_replaced(typed_here, earlier, monkeypatch):
@@ -205,7 +198,7 @@ def test_an_earlier_demo_is_replaced(typed_here, earlier, monkeypatch):
     monkeypatch.setattr("hexacell.cli.commands.run.execute_run", end)
     assert "TCP controller" in typed_here("demo").out
     assert (earlier / "simulated-hexaglide.toml").is_file()
-    assert b"precious" not in contents(earlier).values()
+    assert b"precious" not in CellFolder(earlier).snapshot().values()
 
 
 def test_a_folder_that_is_no_demo_is_not_changed(typed_here, tmp_path):
@@ -215,7 +208,7 @@ def test_a_folder_that_is_no_demo_is_not_changed(typed_here, tmp_path):
     outcome = typed_here("demo", "--folder", "theirs", "--json")
     assert outcome.code == outcome.document["exit_code"] == 2
     assert "theirs: this folder is not empty" in outcome.err
-    assert contents(theirs) == {theirs / "thesis.txt": b"years"}
+    assert CellFolder(theirs).snapshot() == {"thesis.txt": b"years"}
 
 
 @pytest.mark.slow

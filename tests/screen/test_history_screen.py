@@ -11,7 +11,6 @@ from textual.pilot import Pilot
 
 from hexacell.cell.loader import Cell
 from hexacell.config.versions import ConfigEditedSince
-from hexacell.config.write_back import commit
 from hexacell.errors import FileError, UsageError
 from hexacell.run_process.messages import LiveSnapshot
 from hexacell.screen.app import TechnicianApp
@@ -24,7 +23,7 @@ from hexacell.text.config_changes import RELOAD
 from hexacell.text.history import NO_DRIFT, history_line
 from hexacell.text.screens.questions import PERSON
 from hexacell.verdict.acceptance_gates import AcceptanceGate
-from tests.hexacell.services.proposed_runs import ProposedRun, a_cell, propose_run
+from tests.hexacell.services.proposed_runs import ProposedRun, a_cell, committed_runs, propose_run
 from tests.mutations.journals import with_checksum
 from tests.screen.conftest import attended, settled
 from tests.screen.test_job import press, shown, until_shown
@@ -46,13 +45,7 @@ def cell(tmp_path: Path) -> Cell:
 
 @pytest.fixture
 def runs(cell: Cell) -> list[ProposedRun]:
-    """Two calibrations, one after the other."""
-    written = []
-    for name in ("2026-11-20T100000Z", "2026-11-21T100000Z"):
-        run = propose_run(cell, name)
-        commit(run.change, run.folder.path)
-        written.append(run)
-    return written
+    return committed_runs(cell, "2026-11-20T100000Z", "2026-11-21T100000Z")
 
 
 @asynccontextmanager

@@ -1,8 +1,6 @@
 """The real program in tmux, with a cell that another process serves: measured, left, come back to."""
 
-import asyncio
 import shutil
-import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -10,40 +8,20 @@ from pathlib import Path
 
 import pytest
 
-from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
-from hexacell.run_process.client import connect_to_run
 from hexacell.run_process.run_socket import socket_path
+from tests.screen.served_cell import served_in
 from tests.waiting import wait_until
 
-NAME = "simulated-hexaglide"
 TMUX = shutil.which("tmux")
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(TMUX is None, reason="tmux is not installed")]
 
 
-async def end_run(path: Path) -> None:
-    """End the run that a failed test has left."""
-    if (run := await connect_to_run(socket_path(load_cell(path)))) is not None:
-        await run.leave(keep_running=False)
-
-
 @pytest.fixture
 def served(tmp_path: Path) -> Iterator[Path]:
-    """The cell file of a cell that another process serves."""
-    for name in (f"{NAME}.toml", f"{NAME}.controller.toml"):
-        shutil.copy(bundled_config(NAME).with_name(name), tmp_path)
-    path = tmp_path / "served.toml"
-    command = [sys.executable, "-m", "hexacell", "simulate", f"{NAME}.toml", "--output", str(path)]
-    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL) as process:
-        try:
-            wait_until(path.exists)
-            yield path
-        finally:
-            if path.exists():
-                asyncio.run(end_run(path))
-            process.send_signal(signal.SIGINT)
-            process.wait()
+    with served_in(tmp_path) as path:
+        yield path
 
 
 class Terminal:

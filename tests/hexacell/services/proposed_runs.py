@@ -9,6 +9,7 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.config.change import ConfigChange, propose
 from hexacell.config.layout import ConfigLayout, fingerprint
+from hexacell.config.write_back import commit
 from hexacell.kinematics.corrections import Corrections
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot.model import robot_of
@@ -94,3 +95,13 @@ def _history(
             events.RolledBack(),
         ]
     return [*history, events.Ended(exit_code=0, line="over")]
+
+
+def committed_runs(cell: Cell, *names: str) -> list[ProposedRun]:
+    """Calibrations, one after the other."""
+    written = []
+    for name in names:
+        run = propose_run(cell, name)
+        commit(run.change, run.folder.path)
+        written.append(run)
+    return written

@@ -11,7 +11,7 @@ from hexacell.config.write_back import commit
 from hexacell.errors import CellBusy, ExitCode, FileError, UsageError
 from hexacell.runs.cell_lock import cell_lock
 from hexacell.services.write_back.config_rollback import roll_back_config
-from tests.hexacell.services.proposed_runs import ProposedRun, a_cell, propose_run
+from tests.hexacell.services.proposed_runs import ProposedRun, a_cell, committed_runs, propose_run
 
 NAMES = ("2026-11-20T100000Z", "2026-11-21T100000Z", "2026-11-22T100000Z")
 
@@ -24,13 +24,7 @@ def original(cell) -> bytes:
 
 @pytest.fixture
 def runs(cell, original) -> list[ProposedRun]:
-    """Three calibrations, one after the other."""
-    written = []
-    for name in NAMES:
-        run = propose_run(cell, name)
-        commit(run.change, run.folder.path)
-        written.append(run)
-    return written
+    return committed_runs(cell, *NAMES)
 
 
 def config(cell: Cell) -> bytes:

@@ -1,6 +1,5 @@
 """Tasks of a study on a real Dask cluster, whose processes are killed."""
 
-import os
 import signal
 from collections.abc import Iterator
 from concurrent.futures import Executor
@@ -14,9 +13,9 @@ from hexacell import __version__
 from hexacell.errors import HexacellError, UsageError
 from hexacell.study.tasks import NewExecutor, results_of
 from tests.dask_processes import DaskProcesses, dask_processes
+from tests.hexacell.study.test_tasks import SQUARES, fail, square, square_unless_killed
 from tests.waiting import wait_until
 
-SQUARES = range(100)
 GIVEN_UP_AT_ONCE = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0"}
 """The scheduler gives no task of a lost worker to another one, so that this program must."""
 
@@ -33,28 +32,12 @@ def dask_cluster(address: str, patience_s: float = LATE_S) -> NewExecutor:
     return cluster_at(address, patience_s=patience_s)
 
 
-def square(number: int) -> int:
-    return number * number
-
-
-def square_unless_killed(number: int, folder: Path) -> int:
-    """The first worker to come to 50 dies of it."""
-    if number == 50 and not (folder / "killed").exists():
-        (folder / "killed").touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    return square(number)
-
-
 def square_until_held(number: int, folder: Path) -> int:
     """From 50 on nothing ends before the test says so."""
     if number >= 50:
         (folder / "held").touch()
         wait_until((folder / "go").exists)
     return square(number)
-
-
-def fail(number: int) -> int:
-    raise ValueError(number)
 
 
 def impatient_after_the_first(address: str) -> NewExecutor:

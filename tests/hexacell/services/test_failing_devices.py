@@ -10,41 +10,15 @@ import pytest
 from hexacell.cell.devices import ThermometerSettings
 from hexacell.cell.recovery import Action
 from hexacell.cell.simulation import FaultKind, SimulatedFault
-from hexacell.errors import ExitCode, HexacellError
+from hexacell.errors import ExitCode, HexacellError, Interruption
 from hexacell.services.run.replay_run import replay
 from procedures.calibration.calibration import Mode
 from procedures.devices.reconnection import DeviceReplaced
-from procedures.engine.engine import Listener
 from procedures.replay.replayer import Scope
 from procedures.steps import events
+from tests.procedures.runs.listening import failing, on, stop_here
 
 UNPLUGGED: FaultKind = "unplugged"
-
-
-class Enough(Exception):
-    """What was to be seen has happened."""
-
-
-def enough(kind: type[Any]) -> Listener:
-    def listener(event: events.Event, _: object) -> None:
-        if isinstance(event, kind):
-            raise Enough
-
-    return listener
-
-
-def pulled_out(site: Any, kind: FaultKind, device: str, step: str) -> Any:
-    """A listener that breaks a device when a step begins and puts it right after its first failure."""
-    struck: list[bool] = []
-
-    def listener(event: events.Event, _: object) -> None:
-        if isinstance(event, events.StepBegun) and event.step.key == step and not struck:
-            struck.append(True)
-            site.simulated.faults.inject(kind, device)
-        if isinstance(event, events.Failed):
-            site.simulated.faults.clear(kind, device)
-
-    return listener
 
 
 @pytest.fixture
@@ -66,8 +40,10 @@ async def test_an_unplugged_device_that_is_plugged_in_again_is_recovered(
     at_second_point, kind, device, step, voids
 ) -> None:
     site = at_second_point
-    with pytest.raises(Enough):
-        await site.calibrate(pulled_out(site, kind, device, step), enough(events.SetClosed), resume=True)
+    pull_out = failing(step, lambda: site.simulated.faults.inject(kind, device))
+    plug_in = on(events.Failed, lambda: site.simulated.faults.clear(kind, device), count=None)
+    with pytest.raises(Interruption):
+        await site.calibrate(pull_out, plug_in, on(events.SetClosed, stop_here), resume=True)
     failures = site.happened(events.Failed)
     assert failures
     assert all(failure.action is not Action.ABORT for failure in failures)

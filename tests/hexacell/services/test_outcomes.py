@@ -18,19 +18,8 @@ from hexacell.verdict.decision import Verdict
 from procedures.calibration.calibration import Calibration, Mode
 from procedures.steps import events
 from tests.geometries import hexaglide_geometry
+from tests.procedures.runs.listening import on
 from tests.small_cell import FEW_CHOICES
-
-
-def at(kind: type[Any], action: Callable[[], Any]) -> Any:
-    """A listener that does something once, at the first event of a kind."""
-    done: list[bool] = []
-
-    def listener(event: events.Event, _: object) -> None:
-        if isinstance(event, kind) and not done:
-            done.append(True)
-            action()
-
-    return listener
 
 
 @pytest.fixture
@@ -88,7 +77,7 @@ async def test_a_better_result_that_held_out_records_contradict_is_rolled_back_b
 ) -> None:
     site = proposed()
     # So little that the gauges still follow, whichever poses the records led to.
-    ended = await site.calibrate(at(events.Committed, lambda: bend(site, 0.05)), resume=True)
+    ended = await site.calibrate(on(events.Committed, lambda: bend(site, 0.05)), resume=True)
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
     judged = site.happened(events.ResultValidated)[0]
     assert judged.verdict is Verdict.NOT_EVALUATED
@@ -106,7 +95,7 @@ async def test_an_emergency_stop_during_a_move_stops_the_run_and_is_not_reset(ma
         schedule.schedule(SimulatedFault(kind="emergency stop", at_move=schedule.move_count + 1))
 
     with pytest.raises(DeviceError, match="controller") as refusal:
-        await site.calibrate(at(events.RecordTaken, stop_in_the_next_move))
+        await site.calibrate(on(events.RecordTaken, stop_in_the_next_move))
     assert refusal.value.exit_code is ExitCode.HARDWARE
     arrived = [event.orientation for event in site.happened(events.Arrived)]
     assert arrived in ([1], [1, 2]), "the move in which it struck may just have ended"

@@ -16,19 +16,8 @@ from hexacell.verdict.model_evidence import ZEROS_DOUBTED
 from procedures.calibration.calibration import Mode
 from procedures.run.trips import Guard, GuardTripped
 from procedures.steps import events
+from tests.procedures.runs.listening import failing, stop_here
 from tests.small_cell import changed
-
-
-def at_step(key: str, action: Any) -> Any:
-    """A listener that acts once, when a step begins."""
-    done: list[bool] = []
-
-    def listener(event: events.Event, _: object) -> None:
-        if isinstance(event, events.StepBegun) and event.step.key == key and not done:
-            done.append(True)
-            action()
-
-    return listener
 
 
 def edit(cell: Cell) -> None:
@@ -42,7 +31,7 @@ def edit(cell: Cell) -> None:
 async def test_a_pose_of_home_after_a_failed_kinematics_is_not_believed(make_site) -> None:
     """The move was carried out and the pose is that of home; no resumption moves on from there."""
     site = make_site()
-    fail = at_step("P1/o04/move", lambda: site.simulated.faults.inject("forward kinematics", "controller"))
+    fail = failing("P1/o04/move", lambda: site.simulated.faults.inject("forward kinematics", "controller"))
     with pytest.raises(GuardTripped, match="forward kinematics failed") as tripped:
         await site.calibrate(fail)
     assert tripped.value.trip.guard is Guard.POSITION
@@ -141,11 +130,8 @@ async def test_encoders_that_the_controller_reads_need_not_be_homed_before_a_run
     await preflight(cell, Mode.OPTIMISE, unattended=True)
     assert not site.simulated.controller.state.homed
 
-    def enough() -> None:
-        raise Interruption("enough")
-
     with pytest.raises(Interruption, match="enough"):
-        await site.calibrate(at_step("P1/o03/move", enough))
+        await site.calibrate(failing("P1/o03/move", stop_here))
     await preflight(cell, Mode.OPTIMISE, unattended=True)
     located = site.happened(events.Located)[-1]
     assert located.joints == pytest.approx(located.encoders, abs=0.1)

@@ -25,6 +25,7 @@ from procedures.run.keys import Phase, SetKey
 from procedures.run.state import fold
 from procedures.steps import events
 from tests.procedures.runs.listening import at_step, cancelled, failing, on
+from tests.small_cell import changed
 
 Replay = Callable[..., ReplayReport]
 
@@ -93,7 +94,7 @@ def without_directions(event: events.Event) -> Any:
 
 
 def test_a_direction_that_does_not_follow_from_the_move_is_a_difference(recording, replay) -> None:
-    other = changed(recording.history, events.Arrived, {"directions": (0,) * 6}, 3)
+    other = altered(recording.history, events.Arrived, {"directions": (0,) * 6}, 3)
     places = {difference.change.field for difference in replay(other).differences}
     assert any(place.startswith("directions") for place in places)
 
@@ -153,7 +154,7 @@ def test_a_failed_identification_fails_again_with_the_same_message(make_rig, rep
     history = read_journal(rig.folder.journal)
     report = replay(history, rig, Scope.RESULTS)
     assert report.differences == []
-    report = replay(changed(history, events.Interrupted, {"reason": "something else"}), rig, Scope.RESULTS)
+    report = replay(altered(history, events.Interrupted, {"reason": "something else"}), rig, Scope.RESULTS)
     [difference] = report.differences
     assert difference.aspect is Aspect.WORDS
 
@@ -173,19 +174,11 @@ def test_answers_of_a_person_are_repeated(recording, replayed, replay) -> None:
     assert report.differences == []
 
 
-def changed(history: Sequence[events.Event], kind: type[Any], changes: dict[str, Any], nth: int = 1) -> Any:
+def altered(history: Sequence[events.Event], kind: type[Any], changes: dict[str, Any], nth: int = 1) -> Any:
     """A history in which the ``nth`` event of a kind has other values at dotted keys."""
     places = [place for place, event in enumerate(history) if isinstance(event, kind)]
     place = places[nth - 1]
-    return [*history[:place], edited(history[place], changes), *history[place + 1 :]]
-
-
-def edited(section: Any, changes: dict[str, Any]) -> Any:
-    for key, value in changes.items():
-        head, _, rest = key.partition(".")
-        inner = edited(getattr(section, head), {rest: value}) if rest else value
-        section = section.model_copy(update={head: inner})
-    return section
+    return [*history[:place], changed(history[place], changes), *history[place + 1 :]]
 
 
 MANIPULATIONS: dict[str, tuple[type[Any], dict[str, Any], int, Scope, str]] = {
@@ -226,7 +219,7 @@ MANIPULATIONS: dict[str, tuple[type[Any], dict[str, Any], int, Scope, str]] = {
 @pytest.mark.parametrize("what", MANIPULATIONS)
 def test_a_manipulated_event_is_reported_with_its_line(recording, replay, what: str) -> None:
     kind, changes, nth, scope, field = MANIPULATIONS[what]
-    history = changed(recording.history, kind, changes, nth)
+    history = altered(recording.history, kind, changes, nth)
     line = next(
         n for n, pair in enumerate(zip(history, recording.history, strict=True), 1) if pair[0] != pair[1]
     )
@@ -240,7 +233,7 @@ def test_a_manipulated_event_is_reported_with_its_line(recording, replay, what: 
 @pytest.mark.parametrize("changes", [{"spread_mm": (0.0, 1.0, 0.0)}, {"counts": ((0,) * 6,)}])
 def test_a_reading_that_had_not_settled_is_reported(recording, replay, changes: dict[str, Any]) -> None:
     changes = {f"reading.{key}": value for key, value in changes.items()}
-    history = changed(recording.until(events.RecordTaken, count=3), events.RecordTaken, changes, 3)
+    history = altered(recording.until(events.RecordTaken, count=3), events.RecordTaken, changes, 3)
     [first, *_] = replay(history, scope=Scope.RESULTS).differences
     assert "had not settled" in str(first)
 
@@ -248,14 +241,14 @@ def test_a_reading_that_had_not_settled_is_reported(recording, replay, changes: 
 def test_one_manipulated_event_gives_one_difference(recording, replay) -> None:
     whole = recording.until(events.SetClosed)
     last = sum(isinstance(event, events.Arrived) for event in whole)  # no later move begins there
-    history = changed(whole, events.Arrived, {"pose": (100.0, -100.0, 500.0, 1.0, 0.0, 0.0)}, last)
+    history = altered(whole, events.Arrived, {"pose": (100.0, -100.0, 500.0, 1.0, 0.0, 0.0)}, last)
     [line] = (n for n, event in enumerate(history, 1) if event != recording.history[n - 1])
     assert {difference.line for difference in replay(history, scope=Scope.RESULTS).differences} == {line}
 
 
 def test_different_wording_is_reported_as_an_aspect_of_its_own(recording, replay) -> None:
     report = replay(
-        changed(recording.history, events.ResultValidated, {"line": "all is well"}), scope=Scope.RESULTS
+        altered(recording.history, events.ResultValidated, {"line": "all is well"}), scope=Scope.RESULTS
     )
     [difference] = report.differences
     assert difference.aspect is Aspect.WORDS

@@ -26,6 +26,11 @@ def cut_power() -> None:
     raise PowerCut
 
 
+def stop_here() -> None:
+    """For a run of which enough was seen; it can be resumed."""
+    raise Interruption("enough")
+
+
 def on(kind: type[Any], action: Any, count: int | None = 1) -> Any:
     """A listener that does something at the ``count``-th event of a kind, or at each."""
     seen = [0]

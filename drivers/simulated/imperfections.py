@@ -119,18 +119,15 @@ def leg_tensions(
     """Forces (n, 6) with which the legs pull at the platform, N, in balance with its weight."""
     legs = mechanism.legs(geometry, poses, joints)
     arms = legs.platform_joints - poses.positions[:, None, :]
-    pull = np.broadcast_to(_weight(load), poses.positions.shape)
+    direction = np.array(load.direction)
+    weight = load.weight_n * direction / np.linalg.norm(direction)
+    pull = np.broadcast_to(weight, poses.positions.shape)
     centre = arms.mean(axis=1) if load.centre_mm is None else poses.rotations @ np.array(load.centre_mm)
     # Moments are about the ball. A leg that pulls draws the platform toward the base.
     lines = np.concatenate([legs.directions, np.cross(arms, legs.directions)], axis=-1)
     loads = np.concatenate([pull, np.cross(centre, pull)], axis=-1)
     # At a singularity legs cannot hold every weight; the pseudoinverse gives the forces nearest to that.
     return np.asarray(-(np.linalg.pinv(np.swapaxes(lines, -1, -2)) @ loads[..., None])[..., 0])
-
-
-def _weight(load: SimulatedLoad) -> Array:
-    direction = np.array(load.direction)
-    return np.asarray(load.weight_n * direction / np.linalg.norm(direction))
 
 
 def with_longer_legs(

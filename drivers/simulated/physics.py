@@ -280,14 +280,10 @@ class RobotPhysics:
         while self._rows_passed + 1 <= position:
             self._rows_passed += 1
             self._move_platform(self._motion.path[self._rows_passed])
-        self._move_platform(self._motion.joints(now), self._beside_encoders(now))
+        (before, after), share = self._unseen, self._motion.fraction(now)
+        # How far the joints are from where their encoders see them changes with a motion.
+        self._move_platform(self._motion.joints(now), (1.0 - share) * before + share * after)
         return now
-
-    def _beside_encoders(self, now: float) -> Array:
-        """How far the joints (6,) are from where their encoders see them; it changes with a motion."""
-        before, after = self._unseen
-        share = self._motion.fraction(now)
-        return np.asarray((1.0 - share) * before + share * after)
 
     def _move_platform(self, encoders: Array, beside: Array | None = None) -> None:
         """Move the platform as the encoders go straight to a place, and joints ``beside`` them."""

@@ -168,7 +168,7 @@ def test_a_joint_that_stands_keeps_its_direction() -> None:
     "name", ["simulated-hexaglide", "gough-stewart", "linapod", "rotary-cranks", "camera-hexapod"]
 )
 def test_legs_of_every_mechanism_close_under_load_at_the_commanded_pose(name: str) -> None:
-    """Statics and lengths of the machine itself are another computation, of the simulated physics."""
+    """The machine itself finds its lengths under load, and the pose with them, by the simulated physics."""
     cell = load_cell(CONFIGS / f"{name}.toml")
     simulation, mechanism = cell.settings.simulation, cell.settings.mechanism
     assert simulation is not None

@@ -149,8 +149,8 @@ class RunHost:
         for entry in read_entries(self._request.folder.journal):
             self._send_event(messages.EventRecorded(sequence=entry.number, at=entry.at, event=entry.event))
         self._watching.follow(engine, devices)
-        engine.watch(self._on_status)
-        engine.watch_questions(self._on_question)
+        engine.commands.watchers.append(self._on_status)
+        engine.broker.watchers.append(self._on_question)
 
     def _record(self, event: events.Event, _: RunState) -> None:
         at = now()[0]

@@ -164,8 +164,8 @@ class RunDeviceWatch:
     def follow(self, engine: Engine, devices: Devices) -> None:
         """Follow an engine that has not begun; ``devices`` are those that it uses."""
         self._devices = devices
-        engine.watch(self._on_status)
-        engine.watch_questions(self._on_question)
+        engine.commands.watchers.append(self._on_status)
+        engine.broker.watchers.append(self._on_question)
 
     def note(self, event: events.Event, _: RunState | None = None) -> None:
         """Take an event of the run, as its listener: while the robot moves, noise is unknown."""

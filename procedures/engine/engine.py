@@ -13,7 +13,6 @@ from procedures.engine.recovery import GIVE_UP, Recovery, Reversal, revert_at_en
 from procedures.journal.journal import Journal
 from procedures.run.cancellation import shielded
 from procedures.run.keys import Phase
-from procedures.run.questions import Question
 from procedures.run.state import RunState, apply, fold
 from procedures.run.trips import GuardTripped, RobotNotStopped, may_still_move
 from procedures.steps import events
@@ -34,8 +33,9 @@ class Engine:
     """One run, from the end of its journal to the end of the run.
 
     A user interface receives events through listeners, called after each event is on the disk, and the
-    status through ``watch``. It controls the run through ``command``. The executor's operator should be
-    ``broker``, so that any user interface may answer the question that is open.
+    status as a watcher of ``commands``. It controls the run by what it puts, from any thread, into
+    ``queue``. The executor's operator should be ``broker``, so that any user interface may watch and answer
+    the question that is open.
     """
 
     def __init__(
@@ -51,13 +51,11 @@ class Engine:
         self._executor = executor
         self._journal = journal
         self._listeners = tuple(listeners)
-        self._queue = queue or CommandQueue()
-        self._broker = broker or QuestionBroker(UnattendedOperator())
-        self._commands = CommandLoop(
-            self._queue, self._broker, state=lambda: self.state, reject=self._reject
-        )
+        self.queue = queue or CommandQueue()
+        self.broker = broker or QuestionBroker(UnattendedOperator())
+        self.commands = CommandLoop(self.queue, self.broker, state=lambda: self.state, reject=self._reject)
         self._recovery = Recovery(
-            executor, self._commands, self._broker, policy, halt=self._halt, record=self.record
+            executor, self.commands, self.broker, policy, halt=self._halt, record=self.record
         )
         self._is_prepared = False
         self._last: events.Event | None = None
@@ -66,24 +64,7 @@ class Engine:
     @property
     def status(self) -> Status:
         """What the engine is doing now."""
-        return self._commands.flags.status
-
-    @property
-    def question(self) -> Question | None:
-        """The question that waits for an :class:`~procedures.engine.commands.Answer`, if one does."""
-        return self._broker.open
-
-    def watch(self, watcher: Callable[[Status], None]) -> None:
-        """Call ``watcher`` with every new status."""
-        self._commands.watchers.append(watcher)
-
-    def watch_questions(self, watcher: Callable[[Question | None], None]) -> None:
-        """Call ``watcher`` with every question that is opened, and with None when it is closed."""
-        self._broker.watchers.append(watcher)
-
-    def command(self, command: Command) -> None:
-        """Give a command (:mod:`procedures.engine.commands`), from any thread."""
-        self._queue.put(command)
+        return self.commands.flags.status
 
     async def run(self) -> events.Ended:
         """Execute all steps that are left.
@@ -98,9 +79,9 @@ class Engine:
             RobotNotStopped: it ended early, and the robot could not be stopped.
             HexacellError: a step failed, and the policy ends the run.
         """
-        self._commands.set_flags(begun=True)
+        self.commands.set_flags(begun=True)
         try:
-            with self._queue.attended():
+            with self.queue.attended():
                 while await self._advance():
                     pass
         except BaseException as error:
@@ -109,7 +90,7 @@ class Engine:
                 raise
             raise raised from error
         finally:
-            self._commands.set_flags(ended=True)
+            self.commands.set_flags(ended=True)
         ended = _ending(self.state)
         if self.state.ended is None:
             self.record(ended)
@@ -148,22 +129,22 @@ class Engine:
 
     async def _advance(self) -> bool:
         """Obey the commands that waited, decide on a step and execute it; False if none is left."""
-        self._commands.catch_up()
+        self.commands.catch_up()
         self._obey_requests()
-        flags = self._commands.flags
+        flags = self.commands.flags
         if flags.pausing and (flags.at_once or not isinstance(self._last, _BEFORE_SAMPLING)):
             await self._pause(at_once=flags.at_once)
         step: Step | None = None
         try:
             if not self._is_prepared:
-                await self._commands.run_cancellable(self._executor.prepare(self.state))
+                await self.commands.run_cancellable(self._executor.prepare(self.state))
                 self._is_prepared = True
-            step = await self._commands.run_cancellable(self._decide())
+            step = await self.commands.run_cancellable(self._decide())
             if step is None:
                 return False
             self.record(events.StepBegun(step=step))
             executing = self._executor.perform(step, self.state)
-            await self._record_outcome(await self._commands.run_cancellable(executing))
+            await self._record_outcome(await self.commands.run_cancellable(executing))
         except StepCancelled:
             pass
         except OutOfTime:
@@ -234,18 +215,18 @@ class Engine:
             self._is_prepared = False
             await shielded(self._executor.devices.controller.stop())
         self.record(events.Paused(at_once=at_once))
-        self._commands.set_flags(pausing=False, at_once=False, paused=True)
-        while self._commands.flags.paused:
-            await self._commands.take_one()
+        self.commands.set_flags(pausing=False, at_once=False, paused=True)
+        while self.commands.flags.paused:
+            await self.commands.take_one()
             self._obey_requests()
         self.record(events.Resumed())
 
     def _obey_requests(self) -> None:
         """Record what was made invalid; raises ``Interruption`` if the run is to end."""
-        for event in self._commands.take_invalidations():
+        for event in self.commands.take_invalidations():
             if self.state.set(event.at).samples:
                 self.record(event)
-        flags = self._commands.flags
+        flags = self.commands.flags
         if flags.stopping:
             raise Interruption(flags.stopping)
         if flags.returning and self.state.recalled is None:

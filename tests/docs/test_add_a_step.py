@@ -33,7 +33,7 @@ rig = new_rig(Path(sys.argv[1]))
 
 def listener(event, state):
     if state.target is not None:
-        rig.engine.command(Abort())
+        rig.engine.queue.put(Abort())
 
 with pytest.raises(Interruption):
     asyncio.run(rig.run(listener))

@@ -226,7 +226,7 @@ async def test_a_mounting_that_is_measured_again_takes_all_with_it(make_length_r
     def again(event: Any, _: RunState) -> None:
         if isinstance(event, events.RecordTaken) and event.at == MOUNTINGS[1] and not asked:
             asked.append(event)
-            rig.engine.command(MeasureAgain(MOUNTINGS[1]))
+            rig.engine.queue.put(MeasureAgain(MOUNTINGS[1]))
 
     found = await stated(rig, again)
     assert found.verdict is Verdict.PASS

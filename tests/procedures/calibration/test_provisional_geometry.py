@@ -53,7 +53,7 @@ async def test_a_provisional_geometry_is_closer_to_the_truth_than_the_drawing(ri
 
     def look() -> None:
         lent.append(native_layout(HEXAGLIDE_PARAMETERS).read(rig.cell.config_path).geometry)
-        rig.engine.command(Abort())
+        rig.engine.queue.put(Abort())
 
     with pytest.raises(Interruption):
         await rig.run(on(events.ProvisionalApplied, look))
@@ -83,7 +83,7 @@ async def require_finished(rig: Any) -> None:
 async def test_an_abort_at_a_reference_pose_reverts_the_provisional_geometry(rig) -> None:
     before = rig.config
     with pytest.raises(Interruption):
-        await rig.run(on(events.SetClosed, lambda: rig.engine.command(Abort())))
+        await rig.run(on(events.SetClosed, lambda: rig.engine.queue.put(Abort())))
     assert rig.config == before
     await require_finished(rig)
 
@@ -93,7 +93,7 @@ async def test_an_abort_at_a_reference_pose_reverts_the_provisional_geometry(rig
 async def test_an_abort_within_a_set_leaves_the_provisional_geometry_until_the_run_resumes(rig, count):
     before = rig.config
     with pytest.raises(Interruption):
-        await rig.run(on(events.RecordTaken, lambda: rig.engine.command(Abort()), count))
+        await rig.run(on(events.RecordTaken, lambda: rig.engine.queue.put(Abort()), count))
     assert rig.config != before
     await require_finished(rig)
 

@@ -70,7 +70,7 @@ class Stage:
         self.journal = journal
         self.engine = Engine(self.script, journal, [self._hear])  # type: ignore[arg-type]
         self.statuses: list[Status] = []
-        self.engine.watch(self.statuses.append)
+        self.engine.commands.watchers.append(self.statuses.append)
         self._waiting: list[tuple[type[Any], asyncio.Event]] = []
         self.running: asyncio.Task[events.Ended] | None = None
 
@@ -111,14 +111,14 @@ async def stage(bench, journal) -> AsyncIterator[Stage]:
 
 async def test_a_pause_after_the_record_waits_for_the_record(stage: Stage, bench) -> None:
     await stage.held_at("P1/o02/move")
-    stage.engine.command(Pause())
+    stage.engine.queue.put(Pause())
     await asyncio.sleep(0)
     stage.script.let_go.set()
     await stage.until(events.Paused)
     assert stage.kinds[-3:] == ["arrived", "sampled", "paused"]
     assert stage.engine.status is Status.PAUSED
     assert "stop" not in bench.controller.log
-    stage.engine.command(Resume())
+    stage.engine.queue.put(Resume())
     await stage.over()
     assert stage.script.begun == [f"P1/o0{n}/{what}" for n in (1, 2, 3) for what in ("move", "sample")]
     assert stage.statuses == [
@@ -129,7 +129,7 @@ async def test_a_pause_after_the_record_waits_for_the_record(stage: Stage, bench
 @pytest.mark.parametrize("key", ["P1/o02/move", "P1/o02/sample"])
 async def test_a_pause_at_once_stops_motion_and_the_step_is_decided_again(stage, bench, key: str) -> None:
     await stage.held_at(key)
-    stage.engine.command(Pause(at_once=True))
+    stage.engine.queue.put(Pause(at_once=True))
     await stage.until(events.Paused)
     assert bench.controller.log == ["prepare", "stop"]
     assert stage.engine.state.position_unknown
@@ -138,7 +138,7 @@ async def test_a_pause_at_once_stops_motion_and_the_step_is_decided_again(stage,
     for _ in range(5):
         await asyncio.sleep(0)
     assert len(stage.script.begun) == begun, "nothing moves during a pause"
-    stage.engine.command(Resume())
+    stage.engine.queue.put(Resume())
     await stage.over()
     assert stage.script.begun[begun] == "P1/o02/move"
     assert bench.controller.log == ["prepare", "stop", "prepare"]
@@ -147,7 +147,7 @@ async def test_a_pause_at_once_stops_motion_and_the_step_is_decided_again(stage,
 async def test_a_resume_before_the_pause_begins_cancels_it(stage: Stage) -> None:
     await stage.held_at("P1/o02/move")
     for command in (Pause(), Resume()):
-        stage.engine.command(command)
+        stage.engine.queue.put(command)
     await stage.over()
     assert "paused" not in stage.kinds
 
@@ -155,7 +155,7 @@ async def test_a_resume_before_the_pause_begins_cancels_it(stage: Stage) -> None
 async def test_undo_discards_the_last_record_at_the_time_of_the_command(stage: Stage) -> None:
     """Not the record that is being taken at that time."""
     await stage.held_at("P1/o03/sample")
-    stage.engine.command(Undo())
+    stage.engine.queue.put(Undo())
     await stage.over()
     assert events.RecordDiscarded(at=P1, orientation=2) in stage.journal.events
     taken = [sample.orientation for sample in fold(stage.journal.events).set(P1).samples]
@@ -174,7 +174,7 @@ async def test_undo_discards_the_last_record_at_the_time_of_the_command(stage: S
 )
 async def test_measure_again_discards_the_record_or_the_set(stage, command, event):
     await stage.held_at("P1/o03/sample")
-    stage.engine.command(command)
+    stage.engine.queue.put(command)
     await stage.over()
     assert event in stage.journal.events
     orientations = [sample.orientation for sample in fold(stage.journal.events).set(P1).samples]
@@ -183,14 +183,14 @@ async def test_measure_again_discards_the_record_or_the_set(stage, command, even
 
 async def test_records_may_be_undone_during_a_pause(stage: Stage) -> None:
     await stage.held_at("P1/o02/sample")
-    stage.engine.command(Pause())
+    stage.engine.queue.put(Pause())
     await asyncio.sleep(0)
     stage.script.let_go.set()
     await stage.until(events.Paused)
-    stage.engine.command(Undo())
+    stage.engine.queue.put(Undo())
     await stage.until(events.RecordDiscarded)
     assert stage.engine.status is Status.PAUSED
-    stage.engine.command(Resume())
+    stage.engine.queue.put(Resume())
     await stage.over()
 
 
@@ -205,7 +205,7 @@ async def test_records_may_be_undone_during_a_pause(stage: Stage) -> None:
 )
 async def test_a_command_that_cannot_be_obeyed_is_rejected(stage, command: Any, words: str) -> None:
     await stage.held_at("P1/o01/sample")
-    stage.engine.command(command)
+    stage.engine.queue.put(command)
     ended = await stage.over()
     declined = events.CommandRejected(command=type(command).__name__, reason=words)
     assert [event for event in stage.journal.events if isinstance(event, events.CommandRejected)] == [
@@ -216,7 +216,7 @@ async def test_a_command_that_cannot_be_obeyed_is_rejected(stage, command: Any, 
 
 async def test_a_stop_ends_the_run_after_the_current_step(stage: Stage, bench) -> None:
     await stage.held_at("P1/o02/sample")
-    stage.engine.command(Stop("a stop was asked for"))
+    stage.engine.queue.put(Stop("a stop was asked for"))
     await until(lambda: stage.engine.status is Status.STOPPING)
     with pytest.raises(Interruption) as ended:
         await stage.over()
@@ -230,7 +230,7 @@ async def test_a_stop_ends_the_run_after_the_current_step(stage: Stage, bench) -
 async def test_an_abort_ends_the_run_within_a_step_and_stops_motion(stage: Stage, bench, commands) -> None:
     await stage.held_at("P1/o02/move")
     for command in commands:
-        stage.engine.command(command)
+        stage.engine.queue.put(command)
     with pytest.raises(Interruption):
         await stage.running  # type: ignore[misc]  # the step is never let go
     assert stage.journal.events[-1] == events.Interrupted(reason="aborted", exit_code=130)
@@ -241,16 +241,16 @@ async def test_an_abort_ends_the_run_within_a_step_and_stops_motion(stage: Stage
 @pytest.mark.parametrize("command", [Stop(), Abort()])
 async def test_a_stop_or_abort_ends_a_paused_run_at_once(stage: Stage, command: Any) -> None:
     await stage.held_at("P1/o02/move")
-    stage.engine.command(Pause(at_once=True))
+    stage.engine.queue.put(Pause(at_once=True))
     await stage.until(events.Paused)
-    stage.engine.command(command)
+    stage.engine.queue.put(command)
     with pytest.raises(Interruption):
         await stage.running  # type: ignore[misc]
     assert stage.kinds[-2:] == ["paused", "interrupted"]
 
 
 async def test_commands_given_before_the_start_are_obeyed(stage: Stage) -> None:
-    stage.engine.command(Stop("before"))
+    stage.engine.queue.put(Stop("before"))
     with pytest.raises(Interruption, match="before"):
         await stage.engine.run()
     assert stage.script.begun == []
@@ -258,7 +258,7 @@ async def test_commands_given_before_the_start_are_obeyed(stage: Stage) -> None:
 
 async def test_a_command_from_another_thread_is_obeyed_at_once(stage: Stage) -> None:
     await stage.held_at("P1/o02/move")
-    thread = threading.Thread(target=stage.engine.command, args=(Abort("from a thread"),))
+    thread = threading.Thread(target=stage.engine.queue.put, args=(Abort("from a thread"),))
     thread.start()
     with pytest.raises(Interruption, match="from a thread"):
         await stage.running  # type: ignore[misc]
@@ -273,9 +273,9 @@ def when_asked(rig: Any, *commands: Any) -> Meanwhile:
 
     def listener(event: events.Event, _: RunState) -> None:
         if isinstance(event, events.RunStarted | events.Interrupted | events.StepBegun):
-            rig.engine.watch(
+            rig.engine.commands.watchers.append(
                 lambda status: (
-                    [rig.engine.command(c) for c in commands]
+                    [rig.engine.queue.put(c) for c in commands]
                     if status is Status.AWAITING_OPERATOR
                     else None
                 )

@@ -95,7 +95,7 @@ async def test_a_geometry_that_cannot_be_verified_is_rolled_back(rig, recording)
 async def test_a_geometry_stays_in_the_controller_after_an_abort_and_is_verified_on_resuming(
     rig, recording
 ) -> None:
-    abort = failing("after-V2/close", lambda: rig.engine.command(Abort()))
+    abort = failing("after-V2/close", lambda: rig.engine.queue.put(Abort()))
     with pytest.raises(Interruption):
         await rig.run(abort)
     assert rig.config == recording.config_after

@@ -201,11 +201,11 @@ async def test_a_fault_rejects_other_commands_until_it_is_answered(at_second_poi
     await asked.wait()
     moves = len(rig.controller.log)
     for command in (Resume(), Pause()):
-        rig.engine.command(command)
+        rig.engine.queue.put(command)
     await until(lambda: len(happened(rig, events.CommandRejected)) == 2)
     assert rig.engine.status is Status.FAULTED
     assert len(rig.controller.log) == moves, "nothing moves under a fault"
-    rig.engine.command(Answer("retry"))
+    rig.engine.queue.put(Answer("retry"))
     assert await running
     assert [event.command for event in happened(rig, events.CommandRejected)] == ["Resume", "Pause"]
 

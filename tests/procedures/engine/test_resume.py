@@ -127,7 +127,7 @@ TELLING = 125
 async def ended_by_command(rig: Any, number: int) -> bool:
     """Run until somebody aborts at an event; whether it came to that."""
     try:
-        await rig.run(on(object, lambda: rig.engine.command(Abort()), number))
+        await rig.run(on(object, lambda: rig.engine.queue.put(Abort()), number))
     except Interruption:
         return True
     return False

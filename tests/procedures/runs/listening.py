@@ -75,7 +75,7 @@ async def run_until(
     rig: Any, kind: type[Any], *listeners: Any, count: int = 1, policy: Escalations = GIVE_UP
 ) -> None:
     """Run up to the ``count``-th event of a kind; it can be resumed."""
-    enough = on(kind, lambda: rig.engine.command(Stop()), count)
+    enough = on(kind, lambda: rig.engine.queue.put(Stop()), count)
     with pytest.raises(Interruption):
         await rig.run(*listeners, enough, policy=policy)
 

@@ -203,7 +203,8 @@ class PlannedInformation:
         joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
         rows = np.flatnonzero(np.isfinite(joints).all(axis=-1))
         reached = ReachableTargets(poses[rows], joints[rows])
-        jacobian, by_joints = position_derivatives(belief, reached, _one_after_another(reached.joints))
+        arrived = np.sign(np.diff(reached.joints, axis=0, prepend=reached.joints[:1]))  # one after another
+        jacobian, by_joints = position_derivatives(belief, reached, arrived)
         ends = np.cumsum([len(poses) for poses in sets])
         return cls(jacobian, belief.noise.record_weights(by_joints), np.searchsorted(rows, [0, *ends]))
 
@@ -226,11 +227,6 @@ class PlannedInformation:
         before = state.records_at(point)
         added = self.information(point, before + records)
         return added - self.information(point, before) if before else added
-
-
-def _one_after_another(joints: Array) -> Array:
-    """The directions (n, 6) from which joints arrive that are moved from each of n poses to the next."""
-    return np.sign(np.diff(joints, axis=0, prepend=joints[:1]))
 
 
 @lru_cache(maxsize=1)

@@ -11,9 +11,8 @@ geometries within the tolerances. A search that explains nothing is remembered: 
 there is more to explain or more to explain it by, twice the cost, or half as many records again.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -86,16 +85,8 @@ class OnlineEstimate:
         return gauge_zero_at(self.belief, found, point)
 
 
-class RecordEstimator(Protocol):
-    """Estimates the robot from any records."""
-
-    def estimate(self, measurements: MeasurementSet) -> OnlineEstimate:
-        """The estimate from some records, in their order.
-
-        Raises:
-            IdentifiabilityError: they do not belong to this robot.
-        """
-        ...
+RecordEstimator = Callable[[MeasurementSet], OnlineEstimate]
+"""Estimates the robot from any records; raises ``IdentifiabilityError`` if they are of another robot."""
 
 
 class OnlineEstimator:

@@ -88,7 +88,7 @@ class Plan:
         Raises:
             IdentifiabilityError: they do not belong to it.
         """
-        return self._estimator.estimate(state.steering)
+        return self._estimator(state.steering)
 
     def pilot_pose(self, state: CampaignState) -> MeasurePose | None:
         """Where to read the gauges next, only to steer the choice of poses; None where that is not wanted.
@@ -275,7 +275,7 @@ class Plan:
 
     @cached_property
     def _estimator(self) -> RecordEstimator:
-        return self.estimator or OnlineEstimator(self.robot)
+        return self.estimator or OnlineEstimator(self.robot).estimate
 
     @cached_property
     def _stopping(self) -> StoppingRules:

@@ -84,7 +84,7 @@ class StoppingRules:
         target = self.settings.identification.target_mm
         if target is None or not len(state.measurements):
             return None
-        estimate = self.estimator.estimate(state.steering)
+        estimate = self.estimator(state.steering)
         if estimate.identification is None:
             return None
         problem = estimate.identification.problem
@@ -101,6 +101,6 @@ class StoppingRules:
         others = [other for other in sizes if other not in state.done and other != point]
         if not self.settings.identification.choose_points or not others:
             return None
-        belief = self.estimator.estimate(state.steering).belief
+        belief = self.estimator(state.steering).belief
         _, best = self.forecaster.rank_points(state, belief, [point, *others])
         return None if best == point else f"point {best} gains more in the same time"

@@ -153,7 +153,7 @@ class Check:
             self.robot if drifting is None else drifting.robot,
             self.listed,
             self.effort,
-            estimator=self._by_drawing if drifting is None else drifting,
+            estimator=self._by_drawing if drifting is None else drifting.estimate,
             goal=self,
             earlier=self.earlier,
         )
@@ -235,7 +235,7 @@ class Check:
         if self.drifting is not None:
             guarded = self.drifting.at_least(GUARDED_SCALE, measurements)
             return self.drifting.likeliest(measurements), guarded
-        estimate = ScaledEstimate(1.0, self._by_drawing.estimate(measurements), 0.0)
+        estimate = ScaledEstimate(1.0, self._by_drawing(measurements), 0.0)
         return estimate, estimate
 
     def _errors(self, estimate: ScaledEstimate, effects: tuple[Effect, ...]) -> ErrorEstimate | None:
@@ -248,7 +248,7 @@ class Check:
 
     @cached_property
     def _by_drawing(self) -> RecordEstimator:
-        return OnlineEstimator(self.robot)
+        return OnlineEstimator(self.robot).estimate
 
 
 def check_settings(settings: CellSettings, budget: int) -> CellSettings:

@@ -152,10 +152,6 @@ class Limits:
         lowest, highest = (np.broadcast_to(limit, 6) for limit in (self.joint_min, self.joint_max))
         return tuple(zip(lowest.tolist(), highest.tolist(), strict=True))
 
-    def tilts(self, poses: PoseBatch) -> Array:
-        """The tilts (n,), rad, of poses in the convention's frames."""
-        return self.frames.inverse().poses(poses).tilts()
-
     def orientations(self, turns: Array) -> Array:
         """Turns (n, 3, 3) of a level platform, as orientations in the convention's frames."""
         turned: Array = self.frames.base @ turns @ self.frames.platform.T

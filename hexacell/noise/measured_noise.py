@@ -61,12 +61,6 @@ class MeasuredNoise(Frozen):
     forecasts: tuple[AveragingForecast, ...] = ()
     encoders_part_mm: float | None = None
 
-    @property
-    def is_larger(self) -> bool:
-        """Whether something is noisier than the cell file states."""
-        scatter = self.approaches is not None and self.approaches.source is not None
-        return scatter or any(one.is_noisier for one in (*self.gauges, *self.encoders))
-
 
 def with_measured_noise(settings: CellSettings, measured: MeasuredNoise) -> CellSettings:
     """The settings of a cell with what was measured in the place of what they state."""

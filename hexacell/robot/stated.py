@@ -1,5 +1,9 @@
 """The noise, limits and systematic effects that a cell file states, as the mathematics has them."""
 
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -176,68 +180,51 @@ def stated_effects(settings: CellSettings, measured_range_k: float | None = None
     """
     stated, words, limits = settings.uncertainty, settings.mechanism.words, settings.limits
 
-    def size_and_source(key: str) -> tuple[float, str]:
-        return getattr(stated, key), stated.source(key)
+    def of(key: str, kind: Callable[[float], Effect]) -> Effect:
+        """The effect whose size is under a key of the section."""
+        return replace(kind(getattr(stated, key)), source=stated.source(key))
 
     effects: list[Effect] = []
     if isinstance(stated, LinearUncertaintySettings):
-        effects.append(common_encoder_scale(*size_and_source("common_encoder_scale_um_m")))
+        effects.append(of("common_encoder_scale_um_m", common_encoder_scale))
         # Where the scales are identified, what is not known of them is in the covariance of the parameters.
         if not settings.robot.encoder_scales:
-            effects.append(encoder_scales(*size_and_source("encoder_scale_um_m")))
+            effects.append(of("encoder_scale_um_m", encoder_scales))
     elif isinstance(stated, RotaryUncertaintySettings):
-        effects.append(encoder_eccentricities(*size_and_source("encoder_eccentricity_mdeg")))
-    effects.append(
-        stop_repeatability(
-            *size_and_source(repeatability_key(words.joint_unit)),
-            is_in_noise=stated.stop_repeatability_acts == "at work",
-            joint=words.joint,
-            unit=words.joint_unit,
-        )
-    )
-    effects.append(
-        command_repeatability(
-            1e3 * settings.noise.stops,
-            stated.sources.get(STOPS, "cell file"),
-            joint=words.joint,
-            unit=words.joint_unit,
-        )
-    )
+        effects.append(of("encoder_eccentricity_mdeg", encoder_eccentricities))
+    joint, unit = words.joint, words.joint_unit
+    is_in_noise = stated.stop_repeatability_acts == "at work"
+    stops = partial(stop_repeatability, is_in_noise=is_in_noise, joint=joint, unit=unit)
+    beside = command_repeatability(1e3 * settings.noise.stops, joint=joint, unit=unit)
+    effects.append(of(repeatability_key(unit), stops))
+    effects.append(replace(beside, source=stated.sources.get(STOPS, "cell file")))
     if isinstance(stated, UncertaintySettings):
-        short, long = stated.source("rail_wave_short_um"), stated.source("rail_wave_long_um")
         half_mm = 0.5 * (limits.joint_max - limits.joint_min)
         effects += [
-            rail_directions(*size_and_source("rail_direction_mrad")),
-            rail_waves(stated.rail_wave_short_um, stated.rail_wave_short_mm, short),
-            rail_waves(stated.rail_wave_long_um, stated.rail_wave_long_mm, long),
-            common_sag(stated.rail_sag_um, half_mm, stated.source("rail_sag_um")),
+            of("rail_direction_mrad", rail_directions),
+            of("rail_wave_short_um", partial(rail_waves, wavelength_mm=stated.rail_wave_short_mm)),
+            of("rail_wave_long_um", partial(rail_waves, wavelength_mm=stated.rail_wave_long_mm)),
+            of("rail_sag_um", partial(common_sag, half_length_mm=half_mm)),
         ]
     expansion = {
         MachinePart.BASE: stated.expansion_base_um_m_k,
         MachinePart.PLATFORM: stated.expansion_platform_um_m_k,
         MachinePart.LEGS: stated.expansion_legs_um_m_k,
     }
-    change_k, source = size_and_source("temperature_measuring_k")
+    measuring = of("temperature_measuring_k", partial(temperature_while_measuring, um_per_m_k=expansion))
     if measured_range_k is not None:
-        change_k, source = measured_range_k, "thermometers"
-    at_work_k, at_work_source = size_and_source("temperature_at_work_k")
+        measuring = replace(measuring, size=measured_range_k, source="thermometers")
+    scales = gauge_scales(1e3 * settings.noise.gauge_scale, is_estimated=True)
+    yields, (direction, centre) = stated.leg_compliance_um_n, _weight_acts(settings)
     return (
         *effects,
-        gauge_scales(1e3 * settings.noise.gauge_scale, is_estimated=True, source="noise.gauge_scale"),
-        ball_roundness(*size_and_source("ball_roundness_um")),
-        ball_beside_tool(*size_and_source("ball_beside_tool_mm")),
-        temperature_at_work(at_work_k, expansion, at_work_source),
-        temperature_while_measuring(change_k, expansion, source),
-        load_at_work(stated.load_n, stated.leg_compliance_um_n, stated.source("load_n")),
-        _own_weight(settings),
-    )
-
-
-def _own_weight(settings: CellSettings) -> Effect:
-    """The effect of the platform's weight."""
-    stated, source = settings.uncertainty, settings.uncertainty.source("own_weight_n")
-    return own_weight(
-        stated.own_weight_n, stated.leg_compliance_um_n, *_weight_acts(settings), source=source
+        replace(scales, source="noise.gauge_scale"),
+        of("ball_roundness_um", ball_roundness),
+        of("ball_beside_tool_mm", ball_beside_tool),
+        of("temperature_at_work_k", partial(temperature_at_work, um_per_m_k=expansion)),
+        measuring,
+        of("load_n", partial(load_at_work, um_per_n=yields)),
+        of("own_weight_n", partial(own_weight, um_per_n=yields, direction=direction, centre_mm=centre)),
     )
 
 

@@ -13,9 +13,10 @@ from hexacell.text.measured_noise import measured_noise_text
 from hexacell.text.parameters import parameter_rows, parameter_table
 from hexacell.text.terms import terms_text
 from hexacell.uncertainty.budget import UncertaintyBudget
+from hexacell.verdict.acceptance_gates import residual_sentence
 from hexacell.verdict.assessment import Assessment
 from hexacell.verdict.decision import Verdict
-from hexacell.verdict.findings import findings, noise_sentence, pair_sentences, residual_sentence
+from hexacell.verdict.findings import findings, noise_sentence, pair_sentences
 
 
 def identification_report(assessed: Assessment) -> str:

@@ -24,7 +24,7 @@ THOUSANDTH = 1e-3
 """A micrometre in mm, a millidegree in deg."""
 
 
-def common_encoder_scale(um_per_m: float, source: str = "") -> Effect:
+def common_encoder_scale(um_per_m: float) -> Effect:
     """All encoders are wrong by the same share, as of a common temperature or calibration.
 
     Nothing that the gauges measure distinguishes it from a machine that is larger by the same share.
@@ -33,19 +33,19 @@ def common_encoder_scale(um_per_m: float, source: str = "") -> Effect:
     def columns(at: Placement) -> Array:
         return at.by_joints(1e-6 * at.joints[..., None])
 
-    return Effect(COMMON_SCALE, um_per_m, "um/m", Occurrence.CONSTANT, columns, source=source)
+    return Effect(COMMON_SCALE, um_per_m, "um/m", Occurrence.CONSTANT, columns)
 
 
-def encoder_scales(um_per_m: float, source: str = "") -> Effect:
+def encoder_scales(um_per_m: float) -> Effect:
     """Each encoder is wrong by a share of its own."""
 
     def columns(at: Placement) -> Array:
         return at.by_joints(1e-6 * at.joints[..., None] * np.eye(LEGS))
 
-    return Effect("scale of each encoder", um_per_m, "um/m", Occurrence.CONSTANT, columns, source=source)
+    return Effect("scale of each encoder", um_per_m, "um/m", Occurrence.CONSTANT, columns)
 
 
-def encoder_eccentricities(mdeg: float, source: str = "") -> Effect:
+def encoder_eccentricities(mdeg: float) -> Effect:
     """The disc of each rotary encoder is off its axis in any direction: its error is a sine over a turn.
 
     These are two causes a joint: a wave whose phase is unknown has half the variance in each.
@@ -57,7 +57,7 @@ def encoder_eccentricities(mdeg: float, source: str = "") -> Effect:
         return at.by_joints(THOUSANDTH * (np.sqrt(0.5) * both))
 
     name = "eccentricity of each encoder"
-    return Effect(name, mdeg, "mdeg", Occurrence.CONSTANT, waves, source=source)
+    return Effect(name, mdeg, "mdeg", Occurrence.CONSTANT, waves)
 
 
 REPEATABILITY = "repeatability"
@@ -87,12 +87,7 @@ def with_measured_stops(
 
 
 def stop_repeatability(
-    size: float,
-    source: str = "",
-    *,
-    is_in_noise: bool = False,
-    joint: str = "joint",
-    unit: JointUnit = JointUnit.MM,
+    size: float, *, is_in_noise: bool = False, joint: str = "joint", unit: JointUnit = JointUnit.MM
 ) -> Effect:
     """A joint stops beside what its encoder shows, each time elsewhere: play, friction.
 
@@ -102,44 +97,38 @@ def stop_repeatability(
     occurrence = Occurrence.STOPS_AT_WORK if is_in_noise else Occurrence.EVERY_STOP
     name = f"{REPEATABILITY} of a {joint}"
 
-    def columns(at: Placement) -> Array:
-        return at.by_joints(np.broadcast_to(THOUSANDTH * np.eye(LEGS), (len(at), LEGS, LEGS)))
-
-    return Effect(name, size, unit.thousandth, occurrence, columns, source=source)
+    return Effect(name, size, unit.thousandth, occurrence, _by_stops)
 
 
-def command_repeatability(
-    size: float, source: str = "", *, joint: str = "joint", unit: JointUnit = JointUnit.MM
-) -> Effect:
+def command_repeatability(size: float, *, joint: str = "joint", unit: JointUnit = JointUnit.MM) -> Effect:
     """A joint stops beside its command, each time elsewhere, and its encoder shows it.
 
     The records know it; the robot at work suffers it, whatever geometry commands it. ``size`` is in um or
     mdeg, ``joint`` the mechanism's word.
     """
-
-    def columns(at: Placement) -> Array:
-        return at.by_joints(np.broadcast_to(THOUSANDTH * np.eye(LEGS), (len(at), LEGS, LEGS)))
-
     name = f"stops of a {joint} beside its command"
-    return Effect(name, size, unit.thousandth, Occurrence.STOPS_AT_WORK, columns, source=source)
+    return Effect(name, size, unit.thousandth, Occurrence.STOPS_AT_WORK, _by_stops)
+
+
+def _by_stops(at: Placement) -> Array:
+    """Errors of the poses (n, 6, 6) by joints that stop a thousandth of their unit beside."""
+    return at.by_joints(np.broadcast_to(THOUSANDTH * np.eye(LEGS), (len(at), LEGS, LEGS)))
 
 
 UM_PER_M = 1e-6
 """A relative expansion."""
 
 
-def temperature_at_work(kelvin: float, um_per_m_k: Mapping[MachinePart, float], source: str = "") -> Effect:
+def temperature_at_work(kelvin: float, um_per_m_k: Mapping[MachinePart, float]) -> Effect:
     """The whole machine is warmer at work than it was while measuring."""
 
     def expansion(placement: Placement) -> Array:
         return _warmer(placement, um_per_m_k)
 
-    return Effect("temperature at work", kelvin, "K", Occurrence.AT_WORK, expansion, source=source)
+    return Effect("temperature at work", kelvin, "K", Occurrence.AT_WORK, expansion)
 
 
-def temperature_while_measuring(
-    kelvin: float, um_per_m_k: Mapping[MachinePart, float], source: str = ""
-) -> Effect:
+def temperature_while_measuring(kelvin: float, um_per_m_k: Mapping[MachinePart, float]) -> Effect:
     """The whole machine becomes warmer by this much from the first record to the last, evenly."""
 
     def expansion(placement: Placement) -> Array:
@@ -147,10 +136,10 @@ def temperature_while_measuring(
         return progress[:, None, None] * _warmer(placement, um_per_m_k)
 
     name = "temperature while measuring"
-    return Effect(name, kelvin, "K", Occurrence.MEASURING, expansion, source=source)
+    return Effect(name, kelvin, "K", Occurrence.MEASURING, expansion)
 
 
-def load_at_work(newton: float, um_per_n: float, source: str = "") -> Effect:
+def load_at_work(newton: float, um_per_n: float) -> Effect:
     """A force on the tool in any direction; ``um_per_n`` is the compliance of a leg with its joints."""
 
     def bending(placement: Placement) -> Array:
@@ -159,16 +148,14 @@ def load_at_work(newton: float, um_per_n: float, source: str = "") -> Effect:
         inverse = placement.by_constraints
         return np.asarray(UM * um_per_n * inverse @ np.swapaxes(inverse[:, :3], -1, -2))
 
-    return Effect("load at work", newton, "N", Occurrence.AT_WORK, bending, source=source)
+    return Effect("load at work", newton, "N", Occurrence.AT_WORK, bending)
 
 
 LEGS_DIFFER = 0.3
 """Share by which the compliance of a leg, one standard deviation, differs from that of all legs."""
 
 
-def own_weight(
-    newton: float, um_per_n: float, direction: Array, centre_mm: Array | None = None, source: str = ""
-) -> Effect:
+def own_weight(newton: float, um_per_n: float, direction: Array, centre_mm: Array | None = None) -> Effect:
     """Each leg yields by its part of a weight on the platform, all nearly alike.
 
     Args:
@@ -176,7 +163,6 @@ def own_weight(
         um_per_n: compliance of a leg with its joints, one standard deviation.
         direction: of the weight (3,), a unit vector in the convention's base frame.
         centre_mm: where it acts (3,), in its platform frame; None: in the middle of the platform's joints.
-        source: where the weight comes from.
     """
 
     def yielding(placement: Placement) -> Array:
@@ -184,7 +170,7 @@ def own_weight(
         each = UM * um_per_n * placement.by_constraints * forces[:, None, :]
         return np.concatenate([each.sum(axis=-1, keepdims=True), LEGS_DIFFER * each], axis=-1)
 
-    return Effect("own weight", newton, "N", Occurrence.CONSTANT, yielding, source=source)
+    return Effect("own weight", newton, "N", Occurrence.CONSTANT, yielding)
 
 
 def _warmer(placement: Placement, um_per_m_k: Mapping[MachinePart, float]) -> Array:
@@ -198,7 +184,7 @@ def _warmer(placement: Placement, um_per_m_k: Mapping[MachinePart, float]) -> Ar
     return np.asarray(UM_PER_M * moved)
 
 
-def gauge_scales(um_per_mm: float, *, is_estimated: bool, source: str = "") -> Effect:
+def gauge_scales(um_per_mm: float, *, is_estimated: bool) -> Effect:
     """Each gauge is wrong by a share of its own."""
 
     def scales(records: RecordPlacement) -> Array:
@@ -211,23 +197,22 @@ def gauge_scales(um_per_mm: float, *, is_estimated: bool, source: str = "") -> E
         "um/mm",
         Occurrence.MEASURING,
         on_readings=scales,
-        source=source,
         is_estimated=is_estimated,
     )
 
 
-def ball_roundness(um: float, source: str = "") -> Effect:
+def ball_roundness(um: float) -> Effect:
     """The ball is oval: its radius differs from the mean by up to ``um``, in unknown directions."""
-    return Effect("roundness of the ball", um, "um", Occurrence.MEASURING, on_readings=_oval, source=source)
+    return Effect("roundness of the ball", um, "um", Occurrence.MEASURING, on_readings=_oval)
 
 
-def ball_beside_tool(mm: float, source: str = "") -> Effect:
+def ball_beside_tool(mm: float) -> Effect:
     """The tool that works is not centred where the ball was, in any direction of the platform."""
 
     def beside(at: Placement) -> Array:
         return np.concatenate([at.poses.rotations, np.zeros_like(at.poses.rotations)], axis=1)
 
-    return Effect("ball beside the tool's centre", mm, "mm", Occurrence.WITH_TOOL, beside, source=source)
+    return Effect("ball beside the tool's centre", mm, "mm", Occurrence.WITH_TOOL, beside)
 
 
 def _oval(records: RecordPlacement) -> Array:
@@ -244,13 +229,13 @@ def _oval(records: RecordPlacement) -> Array:
     return np.asarray(amplitude * np.einsum("ag,ngk->nak", records.gauges, harmonics))
 
 
-def rail_directions(mrad: float, source: str = "") -> Effect:
+def rail_directions(mrad: float) -> Effect:
     """Each rail points elsewhere, horizontally and vertically."""
     columns = partial(_across_rails, shapes=lambda along: 1e-3 * along[..., None])
-    return Effect("direction of each rail", mrad, "mrad", Occurrence.CONSTANT, columns, source=source)
+    return Effect("direction of each rail", mrad, "mrad", Occurrence.CONSTANT, columns)
 
 
-def rail_waves(um: float, wavelength_mm: float, source: str = "") -> Effect:
+def rail_waves(um: float, wavelength_mm: float) -> Effect:
     """Each rail is wavy with an amplitude and a wavelength, horizontally and vertically.
 
     The phase may be any; a sine and a cosine whose factors have the variance a^2 / 2 each have the same
@@ -263,10 +248,10 @@ def rail_waves(um: float, wavelength_mm: float, source: str = "") -> Effect:
 
     name = f"waves of the rails, {wavelength_mm:g} mm long"
     columns = partial(_across_rails, shapes=waves)
-    return Effect(name, um, "um", Occurrence.CONSTANT, columns, source=source)
+    return Effect(name, um, "um", Occurrence.CONSTANT, columns)
 
 
-def common_sag(um: float, half_length_mm: float, source: str = "") -> Effect:
+def common_sag(um: float, half_length_mm: float) -> Effect:
     """All rails hang through alike, as a parabola ``um`` deep with its ends ``half_length_mm`` away.
 
     Nothing that the gauges measure distinguishes it from a slightly different geometry.
@@ -278,7 +263,7 @@ def common_sag(um: float, half_length_mm: float, source: str = "") -> Effect:
         depth = UM * (placement.guides.along / half_length_mm) ** 2
         return np.asarray(placement.by_constraints @ (placement.guides.across[..., 1] * depth)[..., None])
 
-    return Effect("sag common to all rails", um, "um", Occurrence.CONSTANT, sagging, source=source)
+    return Effect("sag common to all rails", um, "um", Occurrence.CONSTANT, sagging)
 
 
 def _across_rails(placement: Placement, shapes: Callable[[Array], Array]) -> Array:

@@ -51,7 +51,12 @@ def gates(
             passed=identified.termination.converged,
             sentence=f"The solver ended because {identified.termination.value}.",
         ),
-        _agrees(residuals),
+        AcceptanceGate(  # a geometry that the noise does not explain is doubtful: a person decides
+            name="agrees with the noise",
+            passed=residuals.is_explained,
+            sentence=residual_sentence(residuals),
+            needs_person=not residuals.ratio > CONTRADICTED_RATIO,
+        ),
         AcceptanceGate(  # the drawing may be of another machine
             name="within tolerance",
             passed=not violations,
@@ -83,16 +88,20 @@ def gates(
     return tuple(checked)
 
 
-def _agrees(residuals: ChiSquareTest) -> AcceptanceGate:
-    """A geometry whose residuals the noise does not explain is doubtful: a person decides."""
-    sentence = "The residuals agree with the stated noise."
-    if residuals.agreement is ChiSquareVerdict.NOT_EVALUATED:
-        sentence = "The residuals prove nothing: there are no more records than unknowns."
-    elif not residuals.is_explained:
-        sentence = f"Doubtful: the residuals are {residuals.ratio:.1f} times the stated noise."
-    return AcceptanceGate(
-        name="agrees with the noise",
-        passed=residuals.is_explained,
-        sentence=sentence,
-        needs_person=not residuals.ratio > CONTRADICTED_RATIO,
-    )
+def residual_sentence(test: ChiSquareTest) -> str:
+    """The finding of the chi-square test."""
+    match test.agreement:
+        case ChiSquareVerdict.NOT_EVALUATED:
+            return "There are no more records than unknowns: the residuals prove nothing."
+        case ChiSquareVerdict.AGREES:
+            return "The residuals agree with the stated noise."
+        case ChiSquareVerdict.TOO_LARGE:
+            return (
+                f"The residuals are {test.ratio:.1f} times the stated noise: the machine does not "
+                "repeat, a gauge has moved, or the noise is stated too small."
+            )
+        case ChiSquareVerdict.TOO_SMALL:
+            return (
+                f"The residuals are only {test.ratio:.2f} times the stated noise: it is stated too "
+                "large, and every sigma with it."
+            )

@@ -9,6 +9,7 @@ from hexacell.kinematics.mechanism import FrameConvention
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.lengths import shown
 from hexacell.noise.record_noise import NoiseLevel, NoiseLevels
+from hexacell.verdict.acceptance_gates import residual_sentence
 from hexacell.verdict.assessment import SEPARATED_PAIRS, Assessment
 
 POOR_REPEATABILITY = 2.0
@@ -51,25 +52,6 @@ def pair_sentences(assessed: Assessment) -> tuple[str, ...]:
         )
         sentences.append(f"{fact} ({pair.correlation:+.2f}): {remedy}")
     return tuple(sentences)
-
-
-def residual_sentence(test: ChiSquareTest) -> str:
-    """The finding of the chi-square test."""
-    match test.agreement:
-        case ChiSquareVerdict.NOT_EVALUATED:
-            return "There are no more records than unknowns: the residuals prove nothing."
-        case ChiSquareVerdict.AGREES:
-            return "The residuals agree with the stated noise."
-        case ChiSquareVerdict.TOO_LARGE:
-            return (
-                f"The residuals are {test.ratio:.1f} times the stated noise: the machine does not "
-                "repeat, a gauge has moved, or the noise is stated too small."
-            )
-        case ChiSquareVerdict.TOO_SMALL:
-            return (
-                f"The residuals are only {test.ratio:.2f} times the stated noise: it is stated too "
-                "large, and every sigma with it."
-            )
 
 
 def noise_sentence(levels: NoiseLevels) -> str:

@@ -70,8 +70,12 @@ def _differs(then: DeviceIdentity, now: DeviceIdentity) -> bool:
 
 def _concerns(mounted: MountedGauge, errors: Sequence[HexacellError]) -> bool:
     """Whether an error names the gauge; gauges on one port are named together: ``gauges x, y``."""
-    named = [one for one in errors if mounted.gauge.name in _gauge_names(one.subject or "")]
-    return any(isinstance(one, GAUGE_ERRORS) or _has_failed(one, one.subject or "") for one in named)
+    for one in errors:
+        word, _, names = (one.subject or "").partition(" ")
+        is_named = word in {"gauge", "gauges"} and mounted.gauge.name in names.split(", ")
+        if is_named and (isinstance(one, GAUGE_ERRORS) or _has_failed(one, one.subject or "")):
+            return True
+    return False
 
 
 def _has_failed(error: HexacellError, device: str) -> bool:
@@ -80,11 +84,6 @@ def _has_failed(error: HexacellError, device: str) -> bool:
         return True
     is_stale = isinstance(error, GuardTripped) and error.trip.guard is Guard.STALE
     return is_stale and error.subject == device
-
-
-def _gauge_names(subject: str) -> list[str]:
-    word, _, names = subject.partition(" ")
-    return names.split(", ") if word in {"gauge", "gauges"} else []
 
 
 def _words(device: DeviceIdentity) -> str:

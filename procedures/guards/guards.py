@@ -94,7 +94,10 @@ class Guards:
             await self.locate()
             raise
         trip = await self._arrival_trip(await asyncio.to_thread(commanded), reached)
-        if trip := trip or _stuck_gauge(watched, gauges):
+        if trip is None and watched.moved_mm is not None:
+            shown = ((one.device, tuple(one.displayed), watched.moved_mm[one.axis]) for one in gauges)
+            trip = next(filter(None, (stuck_gauge(*one) for one in shown)), None)
+        if trip is not None:
             raise await self.supervisor.stop(trip)
 
     async def locate(self) -> PositionReports:
@@ -188,13 +191,3 @@ class WatchedGauge:
         self.displayed.append(reading.raw)
         deviation_mm = self._mounted.axis.coordinate(reading.value_mm) - self._reference_mm
         return GaugeDeviation(self.axis, deviation_mm)
-
-
-def _stuck_gauge(watched: WatchedSet, gauges: tuple[WatchedGauge, ...]) -> Trip | None:
-    """A gauge whose display did not change although its ball must have moved a certain distance."""
-    if watched.moved_mm is None:
-        return None
-    trips = (
-        stuck_gauge(gauge.device, tuple(gauge.displayed), watched.moved_mm[gauge.axis]) for gauge in gauges
-    )
-    return next((trip for trip in trips if trip is not None), None)

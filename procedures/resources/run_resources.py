@@ -30,7 +30,7 @@ from procedures.guards.guards import Guards
 from procedures.guards.position_check import PositionReports
 from procedures.resources.controller_config import ConfigChanges, ConfigEdits, Startup
 from procedures.run.keys import SetKey, SixNumbers
-from procedures.run.questions import Operator, Question
+from procedures.run.questions import Operator
 from procedures.run.readings import Reading, ReadingSeries, Temperature
 from procedures.run.state import RunState
 from procedures.run.trips import Guard, Trip, WatchedSet
@@ -162,10 +162,6 @@ class RunResources:
         stops = self.calibration.known(state).allowances.stops
         least = least_way(mechanism.words.joint_unit, stops)
         return arrival_directions(joints, state.directions, least)
-
-    async def ask_at_standstill(self, question: Question) -> str | None:
-        """Ask a person while the robot must not move."""
-        return await self.guards.at_standstill(lambda: self.operator.ask(question))
 
     # What the instruments read.
 

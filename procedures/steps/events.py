@@ -135,12 +135,11 @@ class Tripped(BaseEvent):
     @classmethod
     def of(cls, trip: Trip) -> Self:
         """The event of a trip."""
+        problem, action = trip.problem, trip.action
         if trip.stop_failure:
-            problem = f"the robot could not be stopped: {trip.stop_failure}. Before that: {trip.problem}"
-            return cls(
-                guard=trip.guard, device=trip.device, problem=problem, action="Press the emergency stop"
-            )
-        return cls(guard=trip.guard, device=trip.device, problem=trip.problem, action=trip.action)
+            problem = f"the robot could not be stopped: {trip.stop_failure}. Before that: {problem}"
+            action = "Press the emergency stop"
+        return cls(guard=trip.guard, device=trip.device, problem=problem, action=action)
 
     def applied_to(self, state: RunState) -> RunState:
         """An emergency stop lasts until the robot has moved again."""
@@ -266,8 +265,12 @@ _COURSE: tuple[type[BaseEvent], ...] = (
     Paused,
     Resumed,
     RunRecalled,
+    Failed,
+    CommandRejected,
+    Tripped,
+    Interrupted,
+    Ended,
 )
-_COURSE += (Failed, CommandRejected, Tripped, Interrupted, Ended)
 EVENTS = tuple(dict.fromkeys([*_COURSE, *(event for step in STEPS for event in step.outcomes)]))
 
 if TYPE_CHECKING:

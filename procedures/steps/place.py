@@ -37,7 +37,8 @@ class Place(StepOfSet):
     async def perform(self, run: RunResources, state: RunState) -> GaugesPlaced:
         """Ask a person where one is needed; the robot stands still meanwhile."""
         if not are_fixed(run.settings, self.at):
-            await run.ask_at_standstill(ask_placement(self.at, Pose(*self.pose)))
+            question = ask_placement(self.at, Pose(*self.pose))
+            await run.guards.at_standstill(lambda: run.operator.ask(question))
         return GaugesPlaced(at=self.at)
 
 

@@ -61,7 +61,7 @@ class HeldOutSteps:
         if measured.rejections and key.phase.has_new_geometry:
             if step := self._after_rejection(state, key):
                 return step
-        elif measured.rejections > self._rejections_by_chance:
+        elif measured.rejections > (BY_CHANCE if self.sets.allowances.scatters else 0):
             raise TravelError(f"{key}: the ball left the gauges' travel at a held-out pose")
         if step := self.sets.due_first(state, key, self.sets.ball_at_reference(state, key)):
             return step
@@ -72,11 +72,6 @@ class HeldOutSteps:
             return step
         # The poses were chosen with a safe straight line back from each of them.
         return self.way_back(state, key)
-
-    @property
-    def _rejections_by_chance(self) -> int:
-        """How many poses of a set the ball may leave the travel at although they were chosen inside it."""
-        return BY_CHANCE if self.sets.allowances.scatters else 0
 
     def _next_orientation(self, state: RunState, key: SetKey) -> int | None:
         """The lowest one without a record that the controller does not refuse; None if there is none."""

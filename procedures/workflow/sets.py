@@ -28,7 +28,7 @@ from hexacell.noise.allowances import Allowances
 from hexacell.noise.gauge_trial import AXES
 from hexacell.robot.model import Robot
 from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
-from procedures.run.state import RunState, SetState
+from procedures.run.state import RunState
 from procedures.steps.close import CloseSet
 from procedures.steps.events import Step
 from procedures.steps.move import Expectation, Move
@@ -223,7 +223,8 @@ class SetSteps:
         if not self.trial_mm or measured.tried or not measured.samples:
             return None
         rounds, axis = divmod(len(measured.probes), AXES)
-        if rounds and axis == 0 and self._decides(measured, rounds):
+        is_last = rounds >= len(self._distances)  # there is no larger move
+        if rounds and axis == 0 and (is_last or not trial_of(self.allowances, measured).findings):
             is_back = state.at_pose == (key, 1)
             return Try(at=key) if is_back else self.to_reference(state, key, ball)
         moved = self._moved(state, key, axis, self._distances[rounds])
@@ -243,10 +244,6 @@ class SetSteps:
         doublings = int(np.log2(farthest / self.trial_mm))
         smaller = [self.trial_mm * 2.0**doubling for doubling in range(doublings + 1)]
         return (*smaller, farthest, farthest)
-
-    def _decides(self, measured: SetState, rounds: int) -> bool:
-        """Whether so many rounds decide: the gauges are as they should be, or there is no larger move."""
-        return rounds >= len(self._distances) or not trial_of(self.allowances, measured).findings
 
     def _moved(self, state: RunState, key: SetKey, axis: int, farthest_mm: float) -> ThreeNumbers:
         """The move along an axis, to the side on which there is room, as far as there is."""

@@ -55,7 +55,7 @@ def seconds_of(moment: Moment) -> float:
     estimator.estimate(MeasurementSet(state.steering.records[:-1]))
     taken = []
     for _ in range(REPEATS):
-        again = replace(plan, estimator=copy.copy(estimator), with_forecast=True)
+        again = replace(plan, estimator=copy.copy(estimator).estimate, with_forecast=True)
         _ = again.task, again.budget, again.planned_sets, again.systematic_mm  # made once in a campaign
         begun = time.process_time()
         decision = again.decide(state)

@@ -5,7 +5,7 @@ import pytest
 
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
-from hexacell.verdict.findings import residual_sentence
+from hexacell.verdict.acceptance_gates import residual_sentence
 
 
 def test_probability_is_the_table_s():

@@ -126,7 +126,7 @@ def geometry_settings(parameters: ParameterSet) -> type[GeometrySettings]:
     fields: dict[str, Any] = {}
     for kind in parameters.kinds:
         default = ... if kind.default is None else (kind.default,) * LEGS
-        fields[kind.symbol] = (_array_type(kind), Field(default, description=kind.meaning))
+        fields[kind.symbol] = (array_type(kind), Field(default, description=kind.meaning))
     return _derived(GeometrySettings, **fields)
 
 
@@ -142,7 +142,8 @@ def tolerance_settings(parameters: ParameterSet) -> type[ToleranceSettings]:
     return _derived(ToleranceSettings, **fields)
 
 
-def _array_type(kind: ParameterKind) -> Any:  # noqa: ANN401 - a type made here
+def array_type(kind: ParameterKind) -> Any:  # noqa: ANN401 - a type made here
+    """The type of all numbers of a kind: a row for each leg, or a number."""
     made: Any = Positive if kind.is_positive else InRange
     for length in reversed(kind.shape):
         made = tuple.__class_getitem__((made,) * length)

@@ -16,84 +16,98 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from math import hypot
+from typing import Annotated, TypeVar
 
 import numpy as np
+from pydantic import AfterValidator, ConfigDict, Field, ValidationError, field_validator
 
-from hexacell.cell.fields import LARGEST_NUMBER
+from hexacell.cell.diagnostics import Diagnosis, ModelLookup
+from hexacell.cell.fields import Direction, NotNegative, PointInRange, Section, Six
 from hexacell.config.interface import (
     LARGEST_BACKLASH,
     LARGEST_COMPLIANCE_UM_N,
     LARGEST_PLAY_MM,
     write_number,
 )
-from hexacell.errors import FileError
-from hexacell.kinematics.corrections import NO_CORRECTIONS, Corrections
-from hexacell.kinematics.parameters import LEGS
+from hexacell.kinematics.corrections import NONE, Corrections, Three
 from hexacell.storage.toml_document import KeyPath, TomlDocument
 
 TABLE = "corrections"
 REMARK = "# What the controller adds for what is not geometry: play, backlash, compliance under a weight."
+DECIMALS, DECIMALS_OF_DIRECTION = 6, 9
+MOST_MISTAKES = 20
+"""Of so many the first one is reported."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Key:
-    """What may stand behind a key: so many numbers, 0 for one without brackets."""
-
-    count: int
-    lowest: float
-    highest: float
-    decimals: int = 6
-    may_be_empty: bool = False
-
-    @property
-    def expected(self) -> str:
-        """In words."""
-        numbers = f"a list of {self.count} numbers" if self.count else "a number"
-        return f"{numbers} or []" if self.may_be_empty else numbers
+def _of_unit_length(vector: Three) -> Three:
+    length = hypot(*vector)
+    x, y, z = (part / length for part in vector)
+    return x, y, z
 
 
-_KEYS = {
-    "backlash": _Key(LEGS, -LARGEST_BACKLASH, LARGEST_BACKLASH),
-    "play_mm": _Key(LEGS, -LARGEST_PLAY_MM, LARGEST_PLAY_MM),
-    "compliance_um_n": _Key(LEGS, 0.0, LARGEST_COMPLIANCE_UM_N),
-    "weight_n": _Key(0, 0.0, LARGEST_NUMBER),
-    "weight_direction": _Key(3, -LARGEST_NUMBER, LARGEST_NUMBER, decimals=9),
-    "weight_centre_mm": _Key(3, -LARGEST_NUMBER, LARGEST_NUMBER, may_be_empty=True),
-}
+Backlash = Annotated[float, Field(ge=-LARGEST_BACKLASH, le=LARGEST_BACKLASH, allow_inf_nan=False)]
+Play = Annotated[float, Field(ge=-LARGEST_PLAY_MM, le=LARGEST_PLAY_MM, allow_inf_nan=False)]
+Compliance = Annotated[float, Field(ge=0.0, le=LARGEST_COMPLIANCE_UM_N, allow_inf_nan=False)]
+Model = TypeVar("Model", bound=Section)
+
+
+class OfOwner(Section):
+    """A table of the robot's owner, which may have other keys beside these."""
+
+    model_config = ConfigDict(extra="ignore")
+
+
+class TomlCorrections(Section):
+    """The table; its keys are the fields of :class:`.Corrections`."""
+
+    backlash: Six[Backlash] = NONE
+    play_mm: Six[Play] = NONE
+    compliance_um_n: Six[Compliance] = NONE
+    weight_n: NotNegative = 0.0
+    weight_direction: Annotated[Direction, AfterValidator(_of_unit_length)] = (0.0, 0.0, -1.0)
+    weight_centre_mm: PointInRange | None = None
+
+    @field_validator("weight_centre_mm", mode="before")
+    @classmethod
+    def _none_is_an_empty_list(cls, given: object) -> object:
+        return (tuple(given) or None) if isinstance(given, list) else given
+
+
+class WithCorrections(OfOwner):
+    """A config with this table, which may be absent."""
+
+    corrections: TomlCorrections = TomlCorrections()
+
+
+def validated(document: TomlDocument, model: type[Model]) -> Model:
+    """The content of a document by a model; raises ``FileError`` with the line of the first mistake."""
+    try:
+        return model.model_validate_json(document.to_json(), strict=True)
+    except ValidationError as refusal:
+        errors = Diagnosis(document, ModelLookup(model), MOST_MISTAKES).explain_refusal(refusal)
+        raise min(errors.values(), key=lambda error: error.line or 0) from refusal
 
 
 def read_corrections(document: TomlDocument) -> Corrections:
     """The corrections in a document; raises ``FileError`` with the line of what is wrong."""
-    if TABLE not in document.data:
-        return NO_CORRECTIONS
-    table = document.data[TABLE]
-    if not isinstance(table, dict):
-        raise _error(document, (TABLE,), document.mismatch((TABLE,), "a section"))
-    if unknown := next((key for key in table if key not in _KEYS), None):
-        raise _error(document, (TABLE, unknown), f"[{TABLE}] has {unknown!r}, which is no correction")
-    found: dict[str, Any] = {key: _value(document, key) for key in table}
-    if direction := found.get("weight_direction"):
-        if not (length := float(np.linalg.norm(direction))):
-            raise _error(document, (TABLE, "weight_direction"), "the weight has no direction")
-        found["weight_direction"] = tuple(part / length for part in direction)
-    return Corrections(**found)
+    return Corrections(**validated(document, WithCorrections).corrections.model_dump())
 
 
 def with_corrections(text: str, corrections: Corrections) -> str:
     """``text`` with these corrections; raises ``FileError`` where it holds what is no correction."""
     document = TomlDocument.parse(text)
     before, tokens, added = read_corrections(document), dict[KeyPath, str](), dict[str, str]()
-    for key, form in _KEYS.items():
+    for key in TomlCorrections.model_fields:
         old, new = _numbers(before, key), _numbers(corrections, key)
-        half_of_last = 0.5 * 10.0**-form.decimals
+        decimals = DECIMALS_OF_DIRECTION if key == "weight_direction" else DECIMALS
+        half_of_last = 0.5 * 10.0**-decimals
         if len(old) == len(new) and np.allclose(old, new, rtol=0.0, atol=half_of_last):
             continue
-        written = [write_number(value, form.decimals) for value in new]
+        written = [write_number(value, decimals) for value in new]
         if (TABLE, key) not in document.spans:
-            added[key] = f"[{', '.join(written)}]" if form.count else written[0]
-        elif not form.count:
+            added[key] = f"[{', '.join(written)}]" if key != "weight_n" else written[0]
+        elif key == "weight_n":
             tokens[TABLE, key] = written[0]
         elif len(old) != len(new) or key == "weight_direction":
             # A direction that is no unit vector in the text would change its meaning number by number.
@@ -132,27 +146,3 @@ def _with_keys(text: str, added: Mapping[str, str]) -> str:
     new = "".join(f"{prefix}{line}{end}" for line in lines)
     first, rest = text[: line_end.end()], text[line_end.end() :]
     return first + ("" if first.endswith("\n") else end) + new + rest
-
-
-def _value(document: TomlDocument, key: str) -> Any:  # noqa: ANN401 - a number, several, or none
-    form, value = _KEYS[key], document.data[TABLE][key]
-    if not form.count:
-        return _number(document, (TABLE, key), form)
-    if form.may_be_empty and value == []:
-        return None
-    if not isinstance(value, list) or len(value) != form.count:
-        raise _error(document, (TABLE, key), document.mismatch((TABLE, key), form.expected))
-    return tuple(_number(document, (TABLE, key, place), form) for place in range(form.count))
-
-
-def _number(document: TomlDocument, path: KeyPath, form: _Key) -> float:
-    value = document.value(path)
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not is_number or not form.lowest <= value <= form.highest:  # NaN is not between them
-        expected = f"a number from {form.lowest:g} to {form.highest:g}"
-        raise _error(document, path, document.mismatch(path, expected))
-    return float(value)
-
-
-def _error(document: TomlDocument, path: KeyPath, problem: str) -> FileError:
-    return document.error(path, problem, f"[{TABLE}] may have {', '.join(_KEYS)}")

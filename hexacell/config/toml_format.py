@@ -17,22 +17,24 @@ write-back changes the numbers of the geometry and of the corrections, and no ot
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, cast
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import AfterValidator, ValidationInfo, create_model, field_validator
 
-from hexacell.cell.fields import LARGEST_NUMBER
-from hexacell.config.interface import ConfigPart, ControllerLimits, JointRanges, write_number
+from hexacell.cell.by_mechanism import array_type
+from hexacell.cell.fields import InRange, Six, broken_rule, key, outside
+from hexacell.config.interface import ConfigPart, ControllerLimits, write_number
 from hexacell.config.layout import ConfigLayout, FormatOfFile
-from hexacell.config.toml_corrections import read_corrections, with_corrections
-from hexacell.errors import FileError, UsageError
+from hexacell.config.toml_corrections import OfOwner, WithCorrections, validated, with_corrections
+from hexacell.errors import UsageError
 from hexacell.kinematics.corrections import CorrectionKind, Corrections
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
-from hexacell.kinematics.parameters import LEGS, ParameterKind, ParameterSet
+from hexacell.kinematics.parameters import LEGS, ParameterSet
 from hexacell.storage.toml_document import KeyPath, TomlDocument
 
 
@@ -62,14 +64,18 @@ class NativeToml:
 
     def read(self, text: str, source: Path | None) -> ConfigPart:
         """All parameters, or the kinds that ``[geometry]`` has; raises ``FileError`` with the line."""
-        content = self._content(TomlDocument.parse(text, source))
-        there = content.parameters
-        vector = content.geometry().vector.tolist() if there.kinds else []
+        document = TomlDocument.parse(text, source)
+        there, found = self._content(document)
+        vector = _geometry(there, found).vector.tolist() if there.kinds else []
+        branch: Branch | None = None if self._is_part else ()
+        if there.has_branch:
+            branch = found.get("branch") or found["geometry"]["branch"]
+        axes = tuple((axis["min"], axis["max"]) for axis in found.get("axes", ()))
         return ConfigPart(
             dict(zip(there.names, vector, strict=True)),
-            content.branch() if there.has_branch or not self._is_part else None,
-            ControllerLimits(joints=content.joint_ranges()),
-            read_corrections(content.document),
+            branch,
+            ControllerLimits(joints=axes or None),
+            Corrections(**found["corrections"]),
             self.holds,
         )
 
@@ -81,10 +87,10 @@ class NativeToml:
         They have as many decimals as the unit has (1 nm), no exponent. A value that differs by no more than
         half of the last decimal keeps its token.
         """
-        content = self._content(TomlDocument.parse(text))
-        there, tokens = content.parameters, dict[KeyPath, str]()
+        document = TomlDocument.parse(text)
+        (there, found), tokens = self._content(document), dict[KeyPath, str]()
         if there.kinds:
-            before, after = content.geometry(), Geometry(there, [values[name] for name in there.names])
+            before, after = _geometry(there, found), Geometry(there, [values[name] for name in there.names])
             for kind in there.kinds:
                 old, half_of_last = before[kind.symbol], 0.5 * 10.0**-kind.unit.decimals
                 for index, new in np.ndenumerate(after[kind.symbol]):
@@ -92,17 +98,19 @@ class NativeToml:
                         tokens["geometry", kind.symbol, *index] = write_number(
                             float(new), kind.unit.decimals
                         )
-        changed = content.document.replaced(tokens)
+        changed = document.replaced(tokens)
         return changed if corrections is None else with_corrections(changed, corrections)
 
-    def _content(self, document: TomlDocument) -> _Content:
-        if not self._is_part:
-            return _Content(document, self._parameters)
-        section = document.data.get("geometry")
-        names = {*section} if isinstance(section, dict) else set()
-        has_branch = self._parameters.has_branch and "branch" in names | {*document.data}
-        kinds = tuple(kind for kind in self._parameters.kinds if kind.symbol in names)
-        return _Content(document, ParameterSet(kinds, has_branch))
+    def _content(self, document: TomlDocument) -> tuple[ParameterSet, dict[str, Any]]:
+        """The parameters that a document must have, and what it holds."""
+        there, data = self._parameters, document.data
+        if self._is_part:
+            section = data.get("geometry")
+            names = {*section} if isinstance(section, dict) else set()
+            has_branch = there.has_branch and "branch" in names | {*data}
+            there = ParameterSet(tuple(kind for kind in there.kinds if kind.symbol in names), has_branch)
+        model = _model(there, branch_on_top="branch" in data, has_ranges=_has_ranges(data.get("axes")))
+        return there, validated(document, model).model_dump()
 
 
 def native_layout(parameters: ParameterSet) -> ConfigLayout:
@@ -110,93 +118,56 @@ def native_layout(parameters: ParameterSet) -> ConfigLayout:
     return ConfigLayout(parameters, (FormatOfFile("toml", NativeToml(parameters)),))
 
 
-@dataclass(frozen=True, slots=True)
-class _Content:
-    """The content of a config; every method raises ``FileError`` with the line of what is wrong."""
+def _geometry(parameters: ParameterSet, content: Mapping[str, Any]) -> Geometry:
+    return Geometry.of(parameters, content["geometry"])
 
-    document: TomlDocument
-    parameters: ParameterSet
 
-    def geometry(self) -> Geometry:
-        """The geometry, in the units of its parameters."""
-        kinds = self.parameters.kinds
-        values = {kind.symbol: self._numbers(self._path_to(kind.symbol), kind.shape) for kind in kinds}
-        for kind in kinds:
-            if kind.is_positive:
-                self._require_positive(kind, values[kind.symbol])
-        return Geometry.of(self.parameters, values)
+def _has_ranges(axes: object) -> bool:
+    """Whether the six axes all state their range; otherwise they are the owner's own."""
+    return (
+        isinstance(axes, list)
+        and len(axes) == LEGS
+        and all(isinstance(axis, dict) and {"min", "max"} <= axis.keys() for axis in axes)
+    )
 
-    def branch(self) -> Branch:
-        """The signs, in ``[geometry]`` or at the top of the file; empty for a mechanism without."""
-        if not self.parameters.has_branch:
-            return ()
-        path = ("branch",) if "branch" in self.document.data else self._path_to("branch")
-        signs = self._numbers(path, (LEGS,))
-        for leg, sign in enumerate(signs):
-            if sign not in {1, -1}:
-                raise self._mismatch((*path, leg), "1 or -1")
-        return cast("Branch", tuple(int(sign) for sign in signs))
 
-    def joint_ranges(self) -> JointRanges | None:
-        """Smallest and largest joint variable of each leg; None where the six are not all stated."""
-        axes = self.document.data.get("axes")
-        if not isinstance(axes, list) or len(axes) != LEGS:
-            return None
-        if not all(isinstance(axis, dict) and {"min", "max"} <= axis.keys() for axis in axes):
-            return None
-        ranges: list[tuple[float, float]] = []
-        for leg in range(LEGS):
-            low, high = (self._number(("axes", leg, limit)) for limit in ("min", "max"))
-            if low >= high:
-                problem = f"max of axis {leg + 1} is not above its min, {low:g}"
-                raise self._error(("axes", leg, "max"), problem)
-            ranges.append((low, high))
-        return tuple(ranges)
+def _a_sign(value: float) -> int:
+    if value not in {1.0, -1.0}:
+        raise outside("1 or -1")
+    return int(value)
 
-    def _require_positive(self, kind: ParameterKind, values: Any) -> None:  # noqa: ANN401
-        for index, value in np.ndenumerate(np.array(values)):
-            if value <= 0.0:
-                component = kind.components[index[1]] if kind.components else ""
-                name = kind.display_name(index[0] + 1, component)
-                problem = f"{name} is {value} {kind.unit}, but must be above zero"
-                raise self._error(("geometry", kind.symbol, *index), problem)
 
-    def _path_to(self, name: str) -> KeyPath:
-        data = self.document.data
-        if "geometry" not in data:
-            raise self._error((), "there is no [geometry]")
-        if not isinstance(data["geometry"], dict):
-            raise self._mismatch(("geometry",), "a section")
-        if name not in data["geometry"]:
-            raise self._error(("geometry",), f"[geometry] has no {name}")
-        return ("geometry", name)
+Signs = Six[Annotated[InRange, AfterValidator(_a_sign)]]
 
-    def _numbers(self, path: KeyPath, shape: tuple[int, ...]) -> Any:  # noqa: ANN401
-        if not shape:
-            return self._number(path)
-        value = self.document.value(path)
-        if not isinstance(value, list) or len(value) != shape[0]:
-            item = "rows" if shape[1:] else "numbers"
-            raise self._mismatch(path, f"a list of {shape[0]} {item}")
-        return [self._numbers((*path, index), shape[1:]) for index in range(shape[0])]
 
-    def _number(self, path: KeyPath) -> float:
-        value = self.document.value(path)
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self._mismatch(path, "a number")
-        if not abs(value) <= LARGEST_NUMBER:  # NaN too, and integers of hundreds of digits
-            raise self._mismatch(path, f"a finite number within +-{LARGEST_NUMBER:g}")
-        return float(value)
+class _Axis(OfOwner):
+    """The range of a joint variable."""
 
-    def _mismatch(self, path: KeyPath, expected: str) -> FileError:
-        return self._error(path, self.document.mismatch(path, expected))
+    min: InRange
+    max: InRange
 
-    def _error(self, path: KeyPath, problem: str) -> FileError:
-        needed: list[str] = []  # as "S (six rows of 3 numbers, mm)"
-        for kind in self.parameters.kinds:
-            values = f"six rows of {len(kind.components)} numbers" if kind.components else "six numbers"
-            needed.append(f"{kind.symbol} ({', '.join(filter(None, (values, kind.unit)))})")
-        if self.parameters.has_branch:
-            needed.append("branch (six signs)")
-        *most, last = needed
-        return self.document.error(path, problem, f"[geometry] needs {', '.join(most)} and {last}")
+    @field_validator("max")
+    @classmethod
+    def _is_above_min(cls, value: float, info: ValidationInfo) -> float:
+        if (low := info.data.get("min")) is not None and low >= value:
+            raise broken_rule(f"max of this axis is not above its min, {low:g}", "Correct one of them")
+        return value
+
+
+Ranges = Six[_Axis]
+
+
+@cache
+def _model(parameters: ParameterSet, *, branch_on_top: bool, has_ranges: bool) -> type[WithCorrections]:
+    """The model of such a file; the six signs are in ``[geometry]`` or at its top."""
+    geometry: dict[str, Any] = {
+        kind.symbol: (array_type(kind), key(..., kind.meaning)) for kind in parameters.kinds
+    }
+    whole: dict[str, Any] = {"axes": (Ranges, ...)} if has_ranges else {}
+    if parameters.has_branch:
+        place = whole if branch_on_top else geometry
+        place["branch"] = (Signs, key(..., "six signs: the solution of the inverse kinematics of each leg"))
+    if geometry:
+        whole["geometry"] = (create_model("Geometry", __base__=OfOwner, **geometry), ...)
+    made: type[WithCorrections] = create_model("NativeConfig", __base__=WithCorrections, **whole)
+    return made

@@ -57,7 +57,7 @@ MISTAKES = {
         "controller",
         ("  590.0,  # leg 1", "  0.0,  # leg 1"),
         "  0.0,  # leg 1",
-        "leg 1 length is 0.0 mm",
+        "'l' in [geometry], number 1 is 0.0, but must be more than 0",
     ),
 }
 

@@ -166,7 +166,12 @@ ROW = "[ 1.0, 1.0, 1.0 ]"
 @pytest.mark.parametrize(
     ("old", "new", "line", "words"),
     [
-        ("[geometry]", "[geometrie]", None, "there is no [geometry]"),
+        (
+            "[geometry]",
+            "[geometrie]",
+            None,
+            "the section [geometry] is missing. Add it, with S, B, l, branch",
+        ),
         (
             "[geometry]",
             "geometry = 3\n[x]",
@@ -174,13 +179,13 @@ ROW = "[ 1.0, 1.0, 1.0 ]"
             "'geometry' at the top of the file is 3, but must be a section",
         ),
         ("[geometry]", "[[geometry]]", 1, "must be a section"),
-        (S, "", 1, "[geometry] has no S"),
-        (BRANCH, "", 1, "[geometry] has no branch"),
+        (S, "", 1, "'S' in [geometry] is missing"),
+        (BRANCH, "", 1, "'branch' in [geometry] is missing"),
         (
             f"S = [ {ROW}, ",
             "S = [ ",
             2,
-            "'S' in [geometry] is a list of 5 items, but must be a list of 6 rows",
+            "'S' in [geometry] is a list of 5 items, but must be a list of 6 items",
         ),
         (
             f"S = [ {ROW}, {ROW}",
@@ -192,18 +197,18 @@ ROW = "[ 1.0, 1.0, 1.0 ]"
             f"S = [ {ROW}",
             "S = [ 1.0",
             2,
-            "'S' in [geometry], number 1 is 1.0, but must be a list of 3 numbers",
+            "'S' in [geometry], number 1 is 1.0, but must be a list of 3 items",
         ),
-        (B, "B = 'far away'", 3, 'is the text "far away", but must be a list of 6 rows'),
-        (L, "l = [1.0, 2.0]", 4, "is a list of 2 items, but must be a list of 6 numbers"),
+        (B, "B = 'far away'", 3, 'is the text "far away", but must be a list of 6 items'),
+        (L, "l = [1.0, 2.0]", 4, "is a list of 2 items, but must be a list of 6 items"),
         ("l = [ 1.0, 1.0", "l = [ 1.0, '1.0'", 4, 'number 2 is the text "1.0", but must be a number'),
         ("l = [ 1.0, 1.0", "l = [ 1.0,\n true", 5, "number 2 is true, but must be a number"),
         ("B = [ [ 1.0", "B = [ [ nan", 3, "row 1, number 1 is nan, but must be a finite number"),
-        ("B = [ [ 1.0", "B = [ [ 1e308", 3, "but must be a finite number within +-1e+06"),
+        ("B = [ [ 1.0", "B = [ [ 1e308", 3, "but must be a number within +-1e+06"),
         ("B = [ [ 1.0", f"B = [ [ 1{'0' * 400}", 3, "but must be a finite number"),
-        ("l = [ 1.0, 1.0", "l = [ 1.0, -1.0", 4, "leg 2 length is -1.0 mm"),
-        ("l = [ 1.0, 1.0, 1.0", "l = [ 1.0, 1.0, 0", 4, "leg 3 length is 0.0 mm"),
-        (BRANCH, "branch = [1, 1, 1]", 5, "is a list of 3 items, but must be a list of 6 numbers"),
+        ("l = [ 1.0, 1.0", "l = [ 1.0, -1.0", 4, "number 2 is -1.0, but must be more than 0"),
+        ("l = [ 1.0, 1.0, 1.0", "l = [ 1.0, 1.0, 0", 4, "number 3 is 0, but must be more than 0"),
+        (BRANCH, "branch = [1, 1, 1]", 5, "is a list of 3 items, but must be a list of 6 items"),
         ("+1, -1", "\n0, -1", 6, "'branch' in [geometry], number 3 is 0, but must be 1 or -1"),
         ("+1, -1", "true, -1", 5, "number 3 is true, but must be a number"),
         (L, "l = [1.0", 5, "not valid TOML"),
@@ -243,7 +248,7 @@ def test_no_geometry_is_written_that_could_not_be_read(
 def test_a_leg_too_short_for_six_decimals_is_refused(geometry: Geometry) -> None:
     vector = geometry.vector.copy()
     vector[36] = 1e-9
-    with pytest.raises(FileError, match="above zero"):
+    with pytest.raises(FileError, match="more than 0"):
         FORMAT.rewrite([GOOD], Geometry(HEXAGLIDE_PARAMETERS, vector))
 
 

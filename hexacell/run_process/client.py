@@ -28,7 +28,8 @@ taken for lost, because what is still unread goes with the connection, and the r
 
 LOST = protocol.HostFailed(
     problem="the connection to the run is lost: its process was killed, or let this terminal go",
-    action="Attach again. If nothing is there, look at the robot, whose last move may go on, and resume",
+    action="Look at the robot, whose last move may go on. What was measured is kept: leave, come back, and "
+    "where no run is shown then, press r in 2 Preflight, which resumes it",
     exit_code=int(ExitCode.HARDWARE),
 )
 

@@ -4,19 +4,13 @@ import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
-from hexacell.errors import ExitCode, HexacellError, UsageError
+from hexacell.errors import HexacellError, UsageError
 from hexacell.run_process.client import RunConnection
 from hexacell.run_process.messages import HostFailed, HostMessage, LiveSnapshot, StatusChanged
 from hexacell.text.screens.run_picture import RunPicture, picture_after
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Command
 from procedures.run.cancellation import cancel_and_wait
-
-GONE = HostFailed(
-    problem="the process of the run is gone without a word; the robot may still move",
-    action="Look at the robot. What was measured is kept: r in 2 Preflight resumes the run",
-    exit_code=int(ExitCode.FAULT),
-)
 
 FEW_MESSAGES = 50
 """After so many at once, as on attaching, the screen is drawn before the next."""
@@ -90,7 +84,6 @@ class RunFollower:
         if self._is_left:
             return
         if self.picture.status is not Status.ENDED and not self.picture.is_recorded:
-            self._take(GONE)
             self._take(StatusChanged(status=Status.ENDED))
         self._on_end()
 

@@ -9,6 +9,7 @@ from drivers.interfaces import StartupAction
 from hexacell.cell.loader import Cell
 from hexacell.cell.recovery import Action
 from hexacell.kinematics.pose import Pose
+from hexacell.run_process.client import LOST
 from hexacell.run_process.messages import (
     ControlChanged,
     EventRecorded,
@@ -19,7 +20,6 @@ from hexacell.run_process.messages import (
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.child import Preflight
 from hexacell.screen.overlays import FaultOverlay, QuestionOverlay
-from hexacell.screen.watching import GONE
 from hexacell.screen.widgets import TextList, TextPanel
 from hexacell.text.screens.measuring import RESUMABLE
 from hexacell.text.screens.views import ChecklistItem, Mark
@@ -198,7 +198,7 @@ async def test_a_fault_that_the_run_has_left_behind_is_not_shown_on_attaching(ce
             ("The run ended early", "aborted", RESUMABLE),
             "ended early: aborted",
         ),
-        ((), ("The run could not go on", GONE.problem, GONE.action), f"ended early: {GONE.problem}"),
+        ((LOST,), ("The run could not go on", LOST.problem, LOST.action), f"ended early: {LOST.problem}"),
     ],
     ids=["it was aborted", "its process died"],
 )

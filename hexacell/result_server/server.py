@@ -13,7 +13,6 @@ import logging
 import os
 from collections import deque
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import astuple, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -195,13 +194,9 @@ class ResultNodes:
 
 
 async def serve_results(
-    cell: Cell,
-    settings: OpcUaSettings,
-    stop: asyncio.Event,
-    ready: Callable[[str], None],
-    warn: Callable[[str], None],
+    cell: Cell, settings: OpcUaSettings, ready: Callable[[str], None], warn: Callable[[str], None]
 ) -> None:
-    """Serve until ``stop`` is set; ``ready`` gets the address, ``warn`` the reason why runs cannot be read.
+    """Serve until cancelled; ``ready`` gets the address, ``warn`` the reason why runs cannot be read.
 
     Raises:
         FileError: its certificate cannot be read or made.
@@ -220,7 +215,15 @@ async def serve_results(
             action="Correct host and port in [opcua]",
         ) from error
     try:
-        await _follow(cell, settings, nodes, stop, ready=lambda: ready(server.endpoint.geturl()), warn=warn)
+        results = NewResults(cell, warn)
+        for result in (await asyncio.to_thread(results.fetch))[-MOST_RESULTS:]:
+            await nodes.show(result)
+        ready(server.endpoint.geturl())
+        while True:  # what is new comes with an event
+            await asyncio.sleep(settings.poll_s)
+            for result in await asyncio.to_thread(results.fetch):
+                await nodes.show(result)
+                await nodes.notify(result)
     finally:
         await server.stop()
 
@@ -238,26 +241,3 @@ async def _server(settings: OpcUaSettings, reader: Reader, folder: Path) -> Serv
     await server.load_certificate(certificate)
     await server.load_private_key(key)
     return server
-
-
-async def _follow(
-    cell: Cell,
-    settings: OpcUaSettings,
-    nodes: ResultNodes,
-    stop: asyncio.Event,
-    *,
-    ready: Callable[[], None],
-    warn: Callable[[str], None],
-) -> None:
-    """Show what there is, then show what is new with an event."""
-    results = NewResults(cell, warn)
-    for result in (await asyncio.to_thread(results.fetch))[-MOST_RESULTS:]:
-        await nodes.show(result)
-    ready()
-    while not stop.is_set():
-        with suppress(TimeoutError):
-            await asyncio.wait_for(stop.wait(), settings.poll_s)
-            return
-        for result in await asyncio.to_thread(results.fetch):
-            await nodes.show(result)
-            await nodes.notify(result)

@@ -2,9 +2,10 @@
 
 import argparse
 import asyncio
-import signal
 import sys
-from collections.abc import Awaitable, Callable
+from collections.abc import Coroutine
+from contextlib import suppress
+from typing import Any
 
 from hexacell.cell.loader import Cell
 from hexacell.cell.operation import OpcUaSettings
@@ -14,8 +15,6 @@ from hexacell.errors import ExitCode, UsageError
 from hexacell.services.preflight import is_loopback
 from hexacell.services.run.demo import require_simulation, served_cell
 from hexacell.storage.atomic_files import write_atomically
-
-STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def results(options: argparse.Namespace, console: Console) -> ExitCode:
@@ -28,18 +27,15 @@ def results(options: argparse.Namespace, console: Console) -> ExitCode:
         console.warn(f"who reaches {settings.host}:{settings.port} with the password can read results")
     if settings.anonymous:
         console.warn("anybody who reaches the server can read results: anonymous = true in [opcua]")
-    asyncio.run(_until_stopped(lambda stop: _serve_results(cell, settings, console, stop)))
-    return ExitCode.DONE
+    return _until_stopped(_serve_results(cell, settings, console))
 
 
-async def _serve_results(
-    cell: Cell, settings: OpcUaSettings, console: Console, stop: asyncio.Event
-) -> None:
+async def _serve_results(cell: Cell, settings: OpcUaSettings, console: Console) -> None:
     try:
         from hexacell.result_server.server import serve_results  # noqa: PLC0415 - an optional extra
     except ImportError as error:
         raise UsageError("asyncua is not installed", action="Install hexacell[opcua]") from error
-    await serve_results(cell, settings, stop, lambda address: _announce(f"serving {address}"), console.warn)
+    await serve_results(cell, settings, lambda address: _announce(f"serving {address}"), console.warn)
 
 
 def simulate(options: argparse.Namespace, console: Console) -> ExitCode:
@@ -50,31 +46,24 @@ def simulate(options: argparse.Namespace, console: Console) -> ExitCode:
         if options.output.resolve() in own:
             problem = f"--output {options.output} is a file of the simulated cell"
             raise UsageError(problem, action="Name another file")
-    asyncio.run(_until_stopped(lambda stop: _serve_cell(cell, options, stop)))
-    return ExitCode.DONE
+    return _until_stopped(_serve_cell(cell, options))
 
 
-async def _serve_cell(cell: Cell, options: argparse.Namespace, stop: asyncio.Event) -> None:
+async def _serve_cell(cell: Cell, options: argparse.Namespace) -> None:
     with served_cell(cell) as text:
         if options.output is None:
             print(text, flush=True)
         else:
             write_atomically(options.output, text.encode())
         _announce("serving")
-        await stop.wait()
+        await asyncio.Event().wait()
 
 
-async def _until_stopped(serve: Callable[[asyncio.Event], Awaitable[None]]) -> None:
-    """Serve until a signal sets the event, whichever thread it comes to; what is ignored stays so."""
-    stop, loop = asyncio.Event(), asyncio.get_running_loop()
-    heeded = [number for number in STOPS if signal.getsignal(number) is not signal.SIG_IGN]
-    for number in heeded:
-        loop.add_signal_handler(number, stop.set)
-    try:
-        await serve(stop)
-    finally:
-        for number in heeded:
-            loop.remove_signal_handler(number)
+def _until_stopped(serving: Coroutine[Any, Any, None]) -> ExitCode:
+    """Serve until Ctrl-C, SIGTERM or SIGHUP cancels it, which is its ordinary end."""
+    with suppress(KeyboardInterrupt):
+        asyncio.run(serving)
+    return ExitCode.DONE
 
 
 def _announce(what: str) -> None:

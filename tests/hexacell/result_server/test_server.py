@@ -33,6 +33,7 @@ from hexacell.result_server.server import (
 )
 from hexacell.runs.run_folder import runs_folder
 from hexacell.verdict.decision import Verdict
+from procedures.run.cancellation import cancel_and_wait
 from tests.hexacell.services.notify.local_servers import closed_port
 from tests.hexacell.services.proposed_runs import a_cell, propose_run
 
@@ -75,16 +76,15 @@ async def serving(
 ) -> AsyncIterator[str]:
     """The address of a server that runs."""
     settings = OpcUaSettings(port=closed_port(), poll_s=0.05, **further)
-    stop, address = asyncio.Event(), asyncio.get_running_loop().create_future()
-    task = asyncio.create_task(serve_results(cell, settings, stop, address.set_result, warn))
+    address = asyncio.get_running_loop().create_future()
+    task = asyncio.create_task(serve_results(cell, settings, address.set_result, warn))
     await asyncio.wait({task, address}, return_when=asyncio.FIRST_COMPLETED)
     if task.done():
         task.result()
     try:
         yield address.result()
     finally:
-        stop.set()
-        await task
+        await cancel_and_wait(task)
 
 
 @asynccontextmanager
@@ -231,7 +231,7 @@ async def test_a_password_that_others_can_read_and_a_port_that_is_taken_are_refu
         taken.listen()
         settings = OpcUaSettings(port=taken.getsockname()[1])
         with pytest.raises(DeviceError, match="cannot be served"):
-            await serve_results(cell, settings, asyncio.Event(), lambda _: None, lambda _: None)
+            await serve_results(cell, settings, lambda _: None, lambda _: None)
     assert allowed_reader(settings, cell.path.parent) == Reader(USER, PASSWORD), "of the environment"
     monkeypatch.delenv("HEXACELL_OPCUA_USER")
     password_file(cell, 0o644)

@@ -22,50 +22,22 @@ SAFETY_SIGMAS = 3.0
 """Fewer than for identification: these poses are few and not chosen near the limit of the travel, and
 smaller tilts would validate too little."""
 
-SHARES = (0.0, 1.0 / 3.0, 2.0 / 3.0)
-"""Shares of the way to the middle, by which a point is moved that the robot has too few poses at."""
-
-
-def select_near(
-    belief: RobotBelief,
-    point: Array,
-    middle: Array,
-    count: int,
-    orientations: Array,
-    used: Array | None = None,
-) -> PoseBatch:
-    """``count`` poses at a point (3,), mm, or where the robot has so many between it and the ``middle``.
-
-    See :func:`select_validation_poses`.
-
-    Raises:
-        LimitError: too few of them do anywhere; the message is that of the point itself.
-    """
-    failures: list[LimitError] = []
-    for share in SHARES:
-        moved = point + share * (middle - point)
-        try:
-            return select_validation_poses(belief, moved, count, orientations, used)
-        except LimitError as error:
-            failures.append(error)
-    raise failures[0]
-
 
 def select_validation_poses(
-    belief: RobotBelief, point: Array, count: int, orientations: Array, used: Array | None = None
+    belief: RobotBelief, point: Array, count: int, turns: Array, used: Array | None = None
 ) -> PoseBatch:
     """``count`` poses at a point (3,), mm; the first is level.
 
     The ball stays inside the travel although the controller still commands with its own geometry, and
-    the corrected robot can take them too. Of the orientations (n, 3, 3) that allow this, those are
+    the corrected robot can take them too. Of the ``turns`` (n, 3, 3) that allow this, those are
     selected whose actual orientations are farthest from each other and from the ``used`` ones (k, 3, 3),
     wherever these were measured.
 
     Raises:
         LimitError: too few of them do.
     """
-    turns = np.concatenate([np.eye(3)[None], orientations])
-    every = PoseBatch.at(point, belief.limits.orientations(turns))
+    level_first = np.concatenate([np.eye(3)[None], turns])
+    every = PoseBatch.at(point, belief.limits.orientations(level_first))
     limits = belief.limits
     allowed = limits.allow_commands(every) & limits.allow_joints(belief.commanded.joints(every))
     poses = reachable_targets(belief, every[allowed]).poses

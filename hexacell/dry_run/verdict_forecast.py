@@ -13,24 +13,22 @@ the largest error J d over the task poses and its U by draws, as in a run (``doc
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from hexacell.campaign.held_out_sets import held_out_sets, held_out_turns
 from hexacell.campaign.planner import Plan
 from hexacell.cell.measuring import ErrorLimits
-from hexacell.design import candidates
-from hexacell.design.validation_poses import select_near
 from hexacell.errors import HexacellError, LimitError
 from hexacell.identification.diagnostics.model_tests import update
 from hexacell.identification.identified_zeros import IdentifiedZeros
 from hexacell.identification.solver.chi_square import SMALLEST_PROBABILITY
 from hexacell.identification.solver.result import Identification
-from hexacell.kinematics.pose import Pose
+from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, Record
-from hexacell.robot.model import Robot
 from hexacell.robot.virtual_robot import exact_records
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.effects import Occurrence
@@ -200,27 +198,11 @@ def with_held_out_records(plan: Plan, found: Identification) -> Identification:
     """
     written = (plan.robot.identified_zeros(found) or found).geometry
     robot = plan.robot.with_controller(plan.robot.for_controller(written))
-    records = tuple(_records(plan, robot, found))
+    turns = held_out_turns(robot, plan.settings, plan.effort.forecast_held_out_candidates)
+    records: list[Record] = []
+    for point, poses in enumerate(held_out_sets(robot, plan.settings, found, turns), 1 + max(plan.points)):
+        if isinstance(poses, PoseBatch):
+            records += exact_records(robot, point, poses)
     if not records:
         raise LimitError("the robot takes too few poses at each of the held-out points")
-    return update(found, robot.problem(MeasurementSet(records)))
-
-
-def _records(plan: Plan, robot: Robot, found: Identification) -> Iterator[Record]:
-    settings, belief = plan.settings.verification, robot.belief(found)
-    turns = candidates.orientations(
-        plan.effort.forecast_held_out_candidates,
-        belief.limits.tilt,
-        settings.seed,
-        most_twist=belief.limits.turn,
-    )
-    first, used = 1 + max(plan.points), found.poses.rotations
-    own, held_out = plan.settings.identification.points, settings.points
-    middle = robot.from_commands(Pose(*point) for point in own).positions.mean(axis=0)
-    balls = robot.from_commands(Pose(*point) for point in held_out).positions
-    for point, ball in enumerate(balls, start=first):
-        try:
-            poses = select_near(belief, ball, middle, settings.orientations, turns, used)
-        except LimitError:
-            continue
-        yield from exact_records(robot, point, poses)
+    return update(found, robot.problem(MeasurementSet(tuple(records))))

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hexacell.campaign.held_out_sets import held_out_sets, held_out_turns
 from hexacell.cell.model import CellSettings
-from hexacell.design import candidates
-from hexacell.design.validation_poses import select_near, select_validation_poses
+from hexacell.design.validation_poses import select_validation_poses
 from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.result import Identification
@@ -42,31 +42,16 @@ class HeldOutPoses:
     candidate_count: int
 
     def before(self, identified: Identification) -> PosesByPoint:
-        """Poses that are measured before the write-back as well.
-
-        Where a point has too few, because the ball would leave the travel or the robot its limits, they are
-        at one nearer to the middle of the points that the geometry is identified at. Where these are too
-        few, too, the point is left.
+        """Poses that are measured before the write-back as well; a point with too few is left.
 
         Raises:
             LimitError: all points are.
         """
-        belief, turns = self.robot.belief(identified), self._turns()
-        middle = self._positions(self.settings.identification.points).mean(axis=0)
-        chosen: list[tuple[SixNumbers, ...]] = []
-        failures: list[LimitError] = []
-        for position in self._positions(self.settings.verification.points):
-            try:
-                poses = select_near(
-                    belief, position, middle, self._count, turns, identified.poses.rotations
-                )
-                chosen.append(self._commands(poses))
-            except LimitError as error:
-                chosen.append(())
-                failures.append(error)
-        if not any(chosen):
+        sets = [*held_out_sets(self.robot, self.settings, identified, self._turns())]
+        failures = [one for one in sets if isinstance(one, LimitError)]
+        if len(failures) == len(sets):
             raise failures[0]
-        return tuple(chosen)
+        return tuple(() if isinstance(one, LimitError) else self._commands(one) for one in sets)
 
     def after(self, identified: Identification, before: PosesByPoint) -> PosesByPoint:
         """Others at the points of those that are measured ``before``, without their references."""
@@ -88,26 +73,15 @@ class HeldOutPoses:
         """Poses at the point of some; empty where these are, or the robot has too few others."""
         if not chosen:
             return ()
-        position = self._positions(chosen[:1])[0]
+        position = self.robot.from_commands([Pose(*chosen[0])]).positions[0]
+        count = self.settings.verification.orientations
         try:
-            return self._commands(select_validation_poses(belief, position, self._count, turns, used))
+            return self._commands(select_validation_poses(belief, position, count, turns, used))
         except LimitError:
             return ()
 
-    @property
-    def _count(self) -> int:
-        return self.settings.verification.orientations
-
     def _turns(self, added_seed: int = 0) -> Array:
-        limits, seed = self.robot.limits, self.settings.verification.seed + added_seed
-        turns: Array = candidates.orientations(
-            self.candidate_count, limits.tilt, seed, most_twist=limits.turn
-        )
-        return turns
-
-    def _positions(self, commands: Sequence[Sequence[float]]) -> Array:
-        """Positions of the ball (n, 3), mm, in the convention's frames."""
-        return self.robot.from_commands(Pose(*command) for command in commands).positions
+        return held_out_turns(self.robot, self.settings, self.candidate_count, added_seed)
 
     def _commands(self, poses: PoseBatch) -> tuple[SixNumbers, ...]:
         commands = (self.robot.to_command(poses.pose(row)) for row in range(len(poses)))

@@ -108,19 +108,9 @@ def ask_placement(at: SetKey, pose: Pose) -> Question:
     return Question(place, choices=(PLACED,), default=PLACED)
 
 
-def ask_approval(
-    gates: Sequence[AcceptanceGate],
-    diff: str,
-    displacement: TaskDisplacement | None = None,
-    improvement: ExpectedImprovement | None = None,
-    *,
-    cell: str,
-    corrections: tuple[CorrectionChange, ...] = (),
-    found: FoundTerms = NOTHING_FOUND,
-) -> Question:
+def ask_approval(change: PendingChange, *, cell: str) -> Question:
     """Ask whether the config of a cell may be written; answered by the name of who approves."""
-    is_grave = any(gate.needs_cell_name and not gate.passed for gate in gates)
-    change = PendingChange(tuple(gates), diff, displacement, improvement, corrections, found)
+    is_grave = any(gate.needs_cell_name and not gate.passed for gate in change.gates)
     return Question(change, consent=cell if is_grave else "yes")
 
 

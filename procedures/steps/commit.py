@@ -7,7 +7,7 @@ from hexacell.config.change import ConfigChange
 from hexacell.config.write_record import WriteKind
 from hexacell.errors import LimitError
 from procedures.resources.run_resources import RunResources
-from procedures.run.questions import ask_approval
+from procedures.run.questions import PendingChange, ask_approval
 from procedures.run.state import RunState
 from procedures.steps.base import BaseEvent, StepWithoutMotion
 
@@ -53,19 +53,11 @@ class Commit(StepWithoutMotion):
         automatic = run.settings.acceptance.approval == "automatic"
         if automatic and all(gate.passed for gate in conditions):
             return "the cell file: within its limits"
-        displacement = proposed.displacement if proposed else None
+        moved = proposed.displacement if proposed else None
         improvement = state.identified.improvement if state.identified else None
-        name = await run.operator.ask(
-            ask_approval(
-                conditions,
-                change.diff,
-                displacement,
-                improvement,
-                cell=run.settings.name,
-                corrections=change.changed_corrections,
-                found=state.found_terms,
-            )
-        )
+        corrections, terms = change.changed_corrections, state.found_terms
+        pending = PendingChange(conditions, change.diff, moved, improvement, corrections, terms)
+        name = await run.operator.ask(ask_approval(pending, cell=run.settings.name))
         if name is None:
             raise LimitError("the new geometry was declined; nothing was applied")
         return name

@@ -12,7 +12,7 @@ from hexacell.text.terms import found_sentence, run_terms_text
 from hexacell.text.verdict import improvement_sentence
 from hexacell.verdict.decision import VerifiedAccuracy
 from hexacell.verdict.verification import Verification
-from procedures.run.questions import ask_approval
+from procedures.run.questions import PendingChange, ask_approval
 from procedures.run.state import fold
 from procedures.steps import events
 
@@ -82,5 +82,5 @@ def test_a_run_says_what_that_gained_and_nothing_where_nothing_was_found(history
 
 def test_who_approves_a_change_is_told_what_its_corrections_are_for(history) -> None:
     state = fold(event for event in told(history) if not isinstance(event, events.ResultValidated))
-    asked = ask_approval([], "-1\n+2", cell="bench", found=state.found_terms)
+    asked = ask_approval(PendingChange((), "-1\n+2", found=state.found_terms), cell="bench")
     assert found_sentence(FOUND) in question_view(asked, None).paragraphs

@@ -9,7 +9,7 @@ from textual.widgets import Input
 
 from hexacell.screen.overlays import QuestionOverlay, QuitOverlay
 from hexacell.verdict.acceptance_gates import AcceptanceGate
-from procedures.run.questions import ask_approval
+from procedures.run.questions import PendingChange, ask_approval
 from tests.screen.conftest import settled
 from tests.screen.test_job import press, until_shown, workplace_of
 from tests.screen.test_plan_screen import tried
@@ -55,7 +55,7 @@ async def test_what_is_pasted_into_a_name_is_no_consent(cell, history, opened) -
     )
     run = ToldRun()
     async with opened(workplace_of(cell, run, history[:300])) as pilot:
-        run.ask(ask_approval((grave,), "-old\n+new", cell=cell.settings.name))
+        run.ask(ask_approval(PendingChange((grave,), "-old\n+new"), cell=cell.settings.name))
         await until(lambda: isinstance(pilot.app.screen, QuestionOverlay))
         await settled(pilot)
         field = pilot.app.screen.query_one(Input)

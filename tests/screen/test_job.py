@@ -27,7 +27,14 @@ from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Abort, Answer, MeasureAgain, Pause, Resume, Undo
 from procedures.run.keys import Phase, SetKey
-from procedures.run.questions import PLACED, ask_approval, ask_placement, ask_recovery, ask_startup
+from procedures.run.questions import (
+    PLACED,
+    PendingChange,
+    ask_approval,
+    ask_placement,
+    ask_recovery,
+    ask_startup,
+)
 from procedures.run.trips import Guard
 from procedures.steps import events
 from tests.screen.conftest import Opened, attended, settled
@@ -92,7 +99,7 @@ async def test_from_mounting_to_approval(cell, run, history, opened) -> None:
         run.record(history[PLACED_AT:IDENTIFIED])
         await until_shown(pilot, "5/11")
         run.record(history[IDENTIFIED:PROPOSED])
-        run.ask(ask_approval(proposed.gates, "-  old\n+  new", cell=cell.settings.name))
+        run.ask(ask_approval(PendingChange(proposed.gates, "-  old\n+  new"), cell=cell.settings.name))
         await until_shown(pilot, "+  new")
         assert "ok  The residuals agree with the stated noise." in shown(pilot)
         await press(pilot, "y")
@@ -137,7 +144,7 @@ async def test_a_long_change_leaves_in_sight_what_to_press(
         name="far", passed=not is_grave, sentence="Far. " * 40, needs_person=True, needs_cell_name=True
     )
     async with opened(workplace_of(cell, run, history[:PROPOSED]), size) as pilot:
-        run.ask(ask_approval([gate], "-  old\n+  new\n" * 100, cell=cell.settings.name))
+        run.ask(ask_approval(PendingChange((gate,), "-  old\n+  new\n" * 100), cell=cell.settings.name))
         await until_shown(pilot, "+  new")
         await settled(pilot)
         last = pilot.app.screen.query("Input" if is_grave else ".choice").last()

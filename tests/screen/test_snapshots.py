@@ -24,7 +24,7 @@ from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy
 from procedures.engine.command_loop import Status
 from procedures.run.keys import Phase, SetKey
-from procedures.run.questions import ask_approval, ask_placement
+from procedures.run.questions import PendingChange, ask_approval, ask_placement
 from procedures.run.trips import Guard
 from procedures.steps import events
 from tests.screen.conftest import SNAPSHOTS, UPDATE, compare_with_snapshot, settled
@@ -147,7 +147,7 @@ def scene_approve(cell: Cell, history: History) -> Opening:
         needs_cell_name=True,
     )
     gates = tuple(far if gate.name == far.name else gate for gate in proposed.gates)
-    run.ask(ask_approval(gates, DIFF, proposed.displacement, cell=cell.settings.name))
+    run.ask(ask_approval(PendingChange(gates, DIFF, proposed.displacement), cell=cell.settings.name))
     return workplace, ()
 
 

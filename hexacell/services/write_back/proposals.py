@@ -21,7 +21,7 @@ from hexacell.runs.run_folder import RunFolder
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.journal.journal import RESTORE, now, read_journal
 from procedures.resources.controller_config import holds_provisional
-from procedures.run.questions import Operator, Question, ask_approval
+from procedures.run.questions import Operator, PendingChange, Question, ask_approval
 from procedures.run.state import RunState, fold
 from procedures.steps import events
 
@@ -103,15 +103,10 @@ def approval_question(proposal: Proposal) -> Question:
     """What a person is asked before it is written, with the gates that may refuse it."""
     state = proposal.state
     improvement = state.identified.improvement if state.identified else None
-    return ask_approval(
-        proposal.gates,
-        proposal.change.diff,
-        proposal.displacement,
-        improvement,
-        cell=proposal.cell,
-        corrections=proposal.change.changed_corrections,
-        found=state.found_terms,
-    )
+    change, moved = proposal.change, proposal.displacement
+    corrections, terms = change.changed_corrections, state.found_terms
+    pending = PendingChange(proposal.gates, change.diff, moved, improvement, corrections, terms)
+    return ask_approval(pending, cell=proposal.cell)
 
 
 async def apply_proposal(

@@ -14,6 +14,7 @@ from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import (
     NO,
     YES,
+    PendingChange,
     Question,
     ask_acceptance,
     ask_approval,
@@ -25,15 +26,16 @@ from procedures.run.questions import (
 PLACEMENT = ask_placement(SetKey(phase=Phase.IDENTIFY, point=3), Pose(1.0, 2.0, 3.0))
 CHOICES = (Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ABORT)
 FAILURE = ask_recovery("It broke.", CHOICES)
-APPROVAL = ask_approval([], "-1", cell="bench")
+APPROVAL = ask_approval(PendingChange((), "-1"), cell="bench")
 GRAVE = ask_approval(
-    [AcceptanceGate(name="a", passed=False, sentence="b.", needs_cell_name=True)], "-1", cell="bench"
+    PendingChange((AcceptanceGate(name="a", passed=False, sentence="b.", needs_cell_name=True),), "-1"),
+    cell="bench",
 )
 
 
 def test_approval_and_acceptance_say_what_must_be_taught_anew_before_it_asks() -> None:
     moved = TaskDisplacement(position_mm=30.8, orientation_deg=4.0, poses=6, is_within_limits=False)
-    whether_written = ask_approval([], "-1\n+2", moved, cell="bench")
+    whether_written = ask_approval(PendingChange((), "-1\n+2", moved), cell="bench")
     whether_kept = ask_acceptance("all ill", Verification(verdict=Verdict.FAIL), moved)
     for question, asks in ((whether_written, "Write the new"), (whether_kept, "The result did not pass.")):
         *about, asked, request = question_text(question_view(question, None)).splitlines()

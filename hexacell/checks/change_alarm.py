@@ -56,31 +56,24 @@ class ChangeAlarm(Frozen):
         return self.score > self.limit
 
 
-def change_alarm_at(check: Check, measurements: MeasurementSet, warmer: Array | None) -> ChangeAlarm | None:
-    """The alarm of a check whose legs were ``warmer`` (n, 6), K, at each record than at the earlier result.
-
-    None where that is not known (NaN), or where no test is possible.
-    """
-    if warmer is None or not warmer.any():
-        return change_alarm(check, measurements)
-    if np.isnan(warmer).any():
-        return None
-    by_kelvin = check.settings.uncertainty.expansion_legs_um_m_k
-    return change_alarm(check, measurements, leg_expansion(check.robot.commanding, by_kelvin, warmer))
-
-
 def change_alarm(
-    check: Check, measurements: MeasurementSet, expansion: Array | None = None
+    check: Check, measurements: MeasurementSet, warmer: Array | None = None
 ) -> ChangeAlarm | None:
     """Whether the first records raise an alarm, and which leg all of them name.
 
-    Records that the others prove false are not tested. ``expansion`` (n, P) is by how much the parameters
-    differ at each record from those of the result before.
+    Records that the others prove false are not tested. ``warmer`` (n, 6), K, is how much warmer the legs
+    were at each record than at the result before. Where that is not known (NaN) no test is possible.
     """
     before, false = check.before, check.false_records(measurements)
     sound = [row for row, one in enumerate(measurements.records) if one.id not in false]
     if before is None or len(sound) < FIRST_RECORDS:
         return None
+    expansion = None
+    if warmer is not None and warmer.any():
+        if np.isnan(warmer).any():
+            return None
+        by_kelvin = check.settings.uncertainty.expansion_legs_um_m_k
+        expansion = leg_expansion(check.robot.commanding, by_kelvin, warmer)
     first, _ = _single_causes(check, before, measurements, sound[:FIRST_RECORDS], expansion)
     every, legs = _single_causes(check, before, measurements, sound, expansion)
     leg = possible_legs(every.scores, every.sigmas, legs)[0]

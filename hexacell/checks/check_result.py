@@ -7,7 +7,7 @@ import numpy as np
 
 from hexacell.campaign.online_estimate import OnlineEstimate
 from hexacell.cell.fields import Frozen
-from hexacell.checks.change_alarm import ChangeAlarm, change_alarm_at
+from hexacell.checks.change_alarm import ChangeAlarm, change_alarm
 from hexacell.checks.check import Check
 from hexacell.identification.diagnostics.tolerance_check import SIGNIFICANT_SIGMAS
 from hexacell.kinematics.rotations import Array
@@ -104,7 +104,7 @@ def check_result(
         drift_scale=stated.drift_scale,
         changes=tuple(_changes(stated.estimate)),
         left_out=tuple(sorted(check.false_records(measurements))),
-        alarm=change_alarm_at(check, measurements, warmer),
+        alarm=change_alarm(check, measurements, warmer),
     )
 
 

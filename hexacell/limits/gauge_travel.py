@@ -8,6 +8,7 @@ on the plates. Lengths are in mm, along base x, y, z.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -88,26 +89,22 @@ class GaugeTravel:
         Before they are, gauges whose display shows their place are expected in the middle. The others may
         be as far from it as ``mounting_mm``, wherever they are.
         """
-        places = self.places((0.0, 0.0, 0.0) if zero_mm is None else zero_mm)
-        sides = [
-            self._sides(half, *self._known(place, is_zeroed=zero_mm is not None))
-            for half, place in zip(self.half_mm, places, strict=True)
-        ]
-        (a, b, c), (u, v, w) = zip(*sides, strict=True)
-        return GaugeRoom((a, b, c), (u, v, w))
+        if zero_mm is None:
+            return self._room([None if middle is None else 0.0 for middle in self.middle_mm])
+        return self._room(self.places(zero_mm))
 
     @property
     def sure_room(self) -> GaugeRoom:
         """The room that every station has whose plungers stand no farther from the middle than allowed."""
-        x, y, z = (self._sides(half, -self.mounting_mm, self.mounting_mm)[1] for half in self.half_mm)
-        return GaugeRoom((-x, -y, -z), (x, y, z))
+        return self._room((None, None, None))
 
-    def _known(self, place: float | None, *, is_zeroed: bool) -> tuple[float, float]:
-        """From where to where the place of a plunger may be."""
-        if place is None:
-            return -self.mounting_mm, self.mounting_mm
-        return (place, place) if is_zeroed else (0.0, 0.0)
-
-    def _sides(self, half_mm: float, lowest: float, highest: float) -> tuple[float, float]:
-        reach = min(self.plate_mm, half_mm)
-        return max(-self.plate_mm, -reach - lowest), min(self.plate_mm, reach - highest)
+    def _room(self, places: Sequence[float | None]) -> GaugeRoom:
+        """The room of plungers at these places; one that is not known may be anywhere on its mounting."""
+        lower, upper = [], []
+        for half, place in zip(self.half_mm, places, strict=True):
+            lowest, highest = (-self.mounting_mm, self.mounting_mm) if place is None else (place, place)
+            reach = min(self.plate_mm, half)
+            lower.append(max(-self.plate_mm, -reach - lowest))
+            upper.append(min(self.plate_mm, reach - highest))
+        (a, b, c), (u, v, w) = lower, upper
+        return GaugeRoom((a, b, c), (u, v, w))

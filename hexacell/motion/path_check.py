@@ -157,32 +157,21 @@ class LinesFrom:
         return self.belief.commanded.actual_poses(self.start)
 
 
-def stands_clear(belief: RobotBelief, commands: PoseBatch, actual: ActualPoses) -> Mask:
-    """At which of n commands a robot that stands there, ``actual``, is clear of singularities.
-
-    It is what :func:`~hexacell.motion.path_check.is_clear` says of the line from a command to itself: other
-    limits it may be beyond.
-    """
-    found = np.flatnonzero(actual.found)
-    geometries = (belief.controller, commands[found]), (belief.estimate, actual.poses[found])
-    least = MARGIN_SHARE * belief.limits.singularity_margin
-    clear, joints = np.array(actual.found), actual.joints[found]
-    for geometry, poses in geometries:
-        clear[found] &= has_singularity_margin(belief.mechanism, geometry, poses, joints, least)
-    return clear
-
-
 def stands_within_limits(belief: RobotBelief, commands: PoseBatch, *, certainly: bool) -> Mask:
     """At which of n commands the estimated robot keeps its limits and is clear of singularities.
 
-    ``certainly``: so that it also keeps those of passive joints and legs for what is not known of it.
+    Of singularities, as the line from a command to itself is; see :func:`is_clear`. ``certainly``: so that
+    it also keeps the limits of passive joints and legs for what is not known of it.
     """
-    actual = belief.commanded.actual_poses(commands)
+    limits, actual = belief.limits, belief.commanded.actual_poses(commands)
     found = np.flatnonzero(actual.found)
     at = actual[found]
-    margins = belief.limits.leg_margins(belief.mechanism, belief.estimate, at.poses, at.joints)
     wanted = belief.margins_at(at) if certainly else belief.least_margins
-    kept = belief.limits.allow_poses(at.poses, at.joints) & (margins >= wanted).all(axis=-1)
+    margins = limits.leg_margins(belief.mechanism, belief.estimate, at.poses, at.joints)
+    kept = limits.allow_poses(at.poses, at.joints) & (margins >= wanted).all(axis=-1)
+    least = MARGIN_SHARE * limits.singularity_margin
+    for geometry, poses in ((belief.controller, commands[found]), (belief.estimate, at.poses)):
+        kept &= has_singularity_margin(belief.mechanism, geometry, poses, at.joints, least)
     stands = np.array(actual.found)
     stands[found] = kept
-    return stands & stands_clear(belief, commands, actual)
+    return stands

@@ -181,7 +181,7 @@ class UncertaintyBudget:
     @property
     def standard_mm(self) -> float:
         """Combined standard uncertainty at the worst task pose."""
-        return _largest(self._all)
+        return _largest(np.concatenate([self.noise, self.systematic], axis=-1))
 
     @property
     def expanded_mm(self) -> float:
@@ -204,10 +204,6 @@ class UncertaintyBudget:
     def _unknown(self) -> TaskErrors:
         nothing = self.errors_of(np.zeros(self.jacobian.shape[-1]))
         return replace(nothing, estimated=np.zeros_like(self.known))
-
-    @cached_property
-    def _all(self) -> Array:
-        return np.concatenate([self.noise, self.systematic], axis=-1)
 
 
 def _measured(effect: Effect, scale: ScaleObservation | None) -> Effect:

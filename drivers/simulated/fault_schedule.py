@@ -11,7 +11,7 @@ from drivers.simulated.encoders.modbus_bank import SimulatedModbusBank
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
 from drivers.simulated.linuxcnc.server import SimulatedController
 from drivers.simulated.robot import SimulatedMachine
-from drivers.simulated.served_device import Closeable, Switch, setting
+from drivers.simulated.served_device import Closeable, Switch, lasting, setting
 from hexacell.cell.simulation import FaultKind, SimulatedFault
 from hexacell.clock import CellClock
 from hexacell.errors import UsageError
@@ -29,8 +29,8 @@ class CellFaults:
         stop_file: Path,
     ) -> None:
         of_cell: dict[FaultKind, Switch] = {
-            "emergency stop": _lasting(partial(controller.state.set_estop, on=True)),
-            "following error": _lasting(controller.state.exceed_following_error),
+            "emergency stop": lasting(partial(controller.state.set_estop, on=True)),
+            "following error": lasting(controller.state.exceed_following_error),
             "stop line": partial(_set_stop_file, stop_file),
         }
         of_controller: dict[FaultKind, Switch] = {
@@ -72,16 +72,6 @@ class CellFaults:
         """Clear a fault; a machine that was switched off stays off. Raises ``UsageError``."""
         self.check(kind, device)
         self._switches[device][kind](on=False)
-
-
-def _lasting(inject: Callable[[], object]) -> Switch:
-    """A fault whose effect stays when it is cleared."""
-
-    def switch(*, on: bool) -> None:
-        if on:
-            inject()
-
-    return switch
 
 
 def _set_stop_file(stop_file: Path, *, on: bool) -> None:

@@ -1,6 +1,7 @@
 """What simulated devices have in common: they serve until closed, and their faults are switched."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from contextlib import ExitStack
 from typing import Protocol, Self
 
@@ -41,5 +42,15 @@ def setting(owner: object, attribute: str, faulty: object = True, sound: object 
 
     def switch(*, on: bool) -> None:
         setattr(owner, attribute, faulty if on else sound)
+
+    return switch
+
+
+def lasting(inject: Callable[[], object]) -> Switch:
+    """A fault whose effect stays when it is cleared."""
+
+    def switch(*, on: bool) -> None:
+        if on:
+            inject()
 
     return switch

@@ -8,7 +8,7 @@ from typing import Any
 from drivers.simulated.gauges.instruments import OFF_MIDDLE_MM, Indicator, Instrument, PlungerPosition
 from drivers.simulated.gauges.server import LATE_TIMEOUTS, GaugeLineServer, LineFault, LineFaults
 from drivers.simulated.serial_line import PtyLine, SocketLine
-from drivers.simulated.served_device import ServedGroup, Switch, setting
+from drivers.simulated.served_device import ServedGroup, Switch, lasting, setting
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import FaultKind, SimulatedGauges
 from hexacell.clock import CellClock
@@ -94,7 +94,7 @@ class SimulatedGaugeBank(ServedGroup):
             "in peak mode": indicator.set_peak,
             "zeroed": indicator.set_zeroed,
             "low battery": setting(indicator, "battery_low"),
-            "switched on again": partial(_switch_on, line, self._channels[gauge]),
+            "switched on again": lasting(partial(line.switch_on, self._channels[gauge])),
             **{fault.value: partial(line.faults.switch, fault) for fault in LineFault},
         }
 
@@ -132,8 +132,3 @@ class SimulatedGaugeBank(ServedGroup):
             baudrate=self._settings.baudrate,
             faults=LineFaults(LATE_TIMEOUTS * first.timeout_s),
         )
-
-
-def _switch_on(line: GaugeLineServer, channel: int, *, on: bool) -> None:
-    if on:
-        line.switch_on(channel)

@@ -85,11 +85,8 @@ class Scpi(Instrument):
             return (b"OTHER" if changed else self._settings.expect[asked].encode("latin-1")) + b"\n"
         return b""
 
-    def _value(self, channel: int) -> bytes:
-        shown = self.indicators[channel].shown()
-        if shown is None:
-            return self.at_end
-        mm = shown * MM_PER_INCH if self.indicators[channel].inch else shown
+    def format_value(self, _channel: int, value: float, *, inch: bool) -> bytes:
+        mm = value * MM_PER_INCH if inch else value
         return b"%+.8E\n" % (mm / self._settings.mm_per_unit)
 
     @classmethod

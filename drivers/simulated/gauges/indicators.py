@@ -20,8 +20,7 @@ class Mux10(Instrument):
         indicator = self.indicators.get(int(command))
         return self._value(int(command)) if indicator and indicator.powered else b"911\r"
 
-    @staticmethod
-    def format_value(channel: int, value: float, *, inch: bool) -> bytes:
+    def format_value(self, channel: int, value: float, *, inch: bool) -> bytes:
         """A data frame: eight characters of digits and point, the sign apart."""
         return b"0%dA%+09.*f\r" % (channel, 5 if inch else 3, value)
 
@@ -34,8 +33,7 @@ class Sylvac(SingleIndicator):
     at_end: ClassVar[bytes] = b"ERR3\r"
     introduction: ClassVar[bytes] = b"SY276.1\r"
 
-    @staticmethod
-    def format_value(_channel: int, value: float, *, inch: bool) -> bytes:
+    def format_value(self, _channel: int, value: float, *, inch: bool) -> bytes:
         """A micrometre or 10 microinches are the last digit."""
         return b"%+.*f\r" % (5 if inch else 3, value)
 
@@ -62,8 +60,7 @@ class Cdi(SingleIndicator):
 
     at_end: ClassVar[bytes] = b"OUT OF BOUNDS\r\n"
 
-    @staticmethod
-    def format_value(_channel: int, value: float, *, inch: bool) -> bytes:
+    def format_value(self, _channel: int, value: float, *, inch: bool) -> bytes:
         """Sign, eight characters filled up with blanks, and the unit."""
         sign = b"-" if value < 0 else b"+"
         number = b"%8.*f" % (5 if inch else 4, abs(value))
@@ -100,8 +97,7 @@ class IdH(Instrument):
         frame = super()._value(channel)
         return frame if self.indicators[channel].peak_mm is None else frame.replace(b"GN", b"GX")
 
-    @staticmethod
-    def format_value(channel: int, value: float, *, inch: bool) -> bytes:
+    def format_value(self, channel: int, value: float, *, inch: bool) -> bytes:
         """A tenth of a micrometre is its last digit."""
         return b"GN%02d,%+0*.*f\r\n" % (channel, 10, 5 if inch else 4, value)
 
@@ -113,8 +109,7 @@ class HeidenhainNd(SingleIndicator):
     command_end: ClassVar[bytes] = b"\x02"
     at_end: ClassVar[bytes] = b"+    0.0000 ?  \r\n"
 
-    @staticmethod
-    def format_value(_channel: int, value: float, *, inch: bool) -> bytes:
+    def format_value(self, _channel: int, value: float, *, inch: bool) -> bytes:
         """Sign, ten characters, a blank, the unit, and no status."""
         sign = b"-" if value < 0 else b"+"
         return b"%s%10.*f %s  \r\n" % (sign, 5 if inch else 4, abs(value), b'"' if inch else b" ")
@@ -134,8 +129,7 @@ class KeyenceDlRs1a(Instrument):
         values = [self._value(place) if place in self.indicators else self.at_end for place in places]
         return b"M0,%s\r\n" % b",".join(values)
 
-    @staticmethod
-    def format_value(_channel: int, value: float, *, inch: bool) -> bytes:
+    def format_value(self, _channel: int, value: float, *, inch: bool) -> bytes:
         """It knows millimetres only."""
         return b"%+09.4f" % (value * MM_PER_INCH if inch else value)
 
@@ -146,8 +140,7 @@ class DigimaticUsb(SingleIndicator):
     command_end: ClassVar[bytes] = b"\n"
     at_end: ClassVar[bytes] = b"# no data\n"
 
-    @staticmethod
-    def format_value(_channel: int, value: float, *, inch: bool) -> bytes:
+    def format_value(self, _channel: int, value: float, *, inch: bool) -> bytes:
         return b"%.*f\n" % (5 if inch else 3, value)
 
 
@@ -158,8 +151,7 @@ class Uwave(Instrument):
     period_s: ClassVar[float | None] = 0.05
     has_channels: ClassVar[bool] = True
 
-    @staticmethod
-    def format_value(channel: int, value: float, *, inch: bool) -> bytes:
+    def format_value(self, channel: int, value: float, *, inch: bool) -> bytes:
         """A frame of one transmitter; a status line now and then is ignored by readers."""
         unit, decimals = (b"I", 5) if inch else (b"M", 3)
         return b"DT1%04d%+012.*f%s\r" % (channel, decimals, value, unit)

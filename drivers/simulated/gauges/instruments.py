@@ -139,8 +139,7 @@ class Instrument:
         """What the cell file names as the port of a line at ``url``."""
         return url
 
-    @staticmethod
-    def format_value(channel: int, value: float, *, inch: bool) -> bytes:
+    def format_value(self, channel: int, value: float, *, inch: bool) -> bytes:
         """The answer with a value, mm or inch; for instruments whose values say what else they need."""
         raise NotImplementedError
 

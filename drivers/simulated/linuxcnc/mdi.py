@@ -1,6 +1,7 @@
 """Parsing of one MDI block: rapid moves, moves at a feed or of a duration, LinuxCNC's error messages."""
 
 import math
+import operator
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -43,7 +44,7 @@ class ModalState:
     @property
     def offsets(self) -> tuple[float, ...]:
         """The answer to ``get pos_offset``, mm and deg."""
-        return tuple(one + other for one, other in zip(self.work_offset, self.offset, strict=True))
+        return tuple(map(operator.add, self.work_offset, self.offset))
 
     @property
     def codes(self) -> str:
@@ -85,18 +86,13 @@ def parse_block(block: str, current: Pose, modes: ModalState | None = None) -> P
     if not numbers and 1.0 not in codes:
         return ParsedBlock(after)
     system = ModalState() if _MACHINE_COORDINATES in codes else after
-    stated = zip(_AXES, _in_system(current, system).as_tuple(), strict=True)
+    unshifted = map(operator.sub, current.as_tuple(), system.offsets)
+    here = _rotated(Pose(*unshifted), -system.rotation_deg)  # in the coordinate system
+    stated = zip(_AXES, here.as_tuple(), strict=True)
     turned = _rotated(Pose(*(numbers.get(axis, value) for axis, value in stated)), system.rotation_deg)
-    pairs = zip(turned.as_tuple(), system.offsets, strict=True)
-    target = Pose(*(value + offset for value, offset in pairs))
+    target = Pose(*map(operator.add, turned.as_tuple(), system.offsets))
     duration_s = _duration(after, feed, current, target)
     return ParsedBlock(after, target, duration_s) if numbers else ParsedBlock(after)
-
-
-def _in_system(pose: Pose, system: ModalState) -> Pose:
-    """A pose of the machine in a coordinate system."""
-    pairs = zip(pose.as_tuple(), system.offsets, strict=True)
-    return _rotated(Pose(*(value - offset for value, offset in pairs)), -system.rotation_deg)
 
 
 def _rotated(pose: Pose, degrees: float) -> Pose:

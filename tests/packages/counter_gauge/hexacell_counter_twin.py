@@ -11,8 +11,7 @@ class Counter(SingleIndicator):
     baudrate: ClassVar[int] = 19200
     at_end: ClassVar[bytes] = b"P=END\r\n"
 
-    @staticmethod
-    def format_value(_channel: int, value: float, *, inch: bool) -> bytes:
+    def format_value(self, _channel: int, value: float, *, inch: bool) -> bytes:
         """Sign, two digits, four decimals, and the unit."""
         return f"P={value:+08.4f} {'in' if inch else 'mm'}\r\n".encode("ascii")
 

@@ -129,6 +129,7 @@ class AlarmTiming:
     warnings_every: int = 10
 
 
+@dataclass(eq=False)
 class AlarmPoll:
     """Reads the alarm entries of all nodes: at first, after emergencies, and periodically.
 
@@ -136,20 +137,17 @@ class AlarmPoll:
     a quarter of the period. Where samples follow each other without a pause it is put off therefore.
     """
 
-    def __init__(
-        self,
-        nodes: Sequence[EncoderNode],
-        monitors: Sequence[NodeMonitor],
-        timing: AlarmTiming = AlarmTiming(),
-    ) -> None:
-        self._monitors = monitors
-        self._timing = timing
-        self._emergencies_seen = -1
-        self._polls = 0
+    nodes: Sequence[EncoderNode]
+    monitors: Sequence[NodeMonitor]
+    timing: AlarmTiming = AlarmTiming()
+    _emergencies_seen: int = -1
+    _polls: int = 0
+
+    def __post_init__(self) -> None:
         self._begun_s = self._polled_s = self._sampling_s = self._cost_s = 0.0
         self._entries = [
             (node, entry)
-            for node in nodes
+            for node in self.nodes
             for entry in (ERROR_REGISTER, ALARMS, WARNINGS)
             if node.read_optional(entry) is not None
         ]
@@ -172,8 +170,8 @@ class AlarmPoll:
         """
         now_s = time.monotonic()
         self._sampling_s += now_s - self._begun_s
-        emergencies = sum([monitor.emergencies for monitor in self._monitors])
-        since_s, timing = now_s - self._polled_s, self._timing
+        emergencies = sum([monitor.emergencies for monitor in self.monitors])
+        since_s, timing = now_s - self._polled_s, self.timing
         is_cheap = since_s >= 2.0 * self._sampling_s or timing.bus_share * since_s >= self._cost_s
         if emergencies == self._emergencies_seen and not (since_s >= timing.period_s and is_cheap):
             return

@@ -124,6 +124,7 @@ def _mapping_parameter(position: ObjectEntry) -> int:
     return position.index << 16 | position.subindex << 8 | _POSITION_BITS
 
 
+@dataclass(eq=False)
 class SyncSampler:
     """Sends SYNC and counts responses: no leg may respond more often than there were SYNCs.
 
@@ -137,28 +138,21 @@ class SyncSampler:
     tenth of a round on a fast bus.
     """
 
-    def __init__(
-        self,
-        legs: Sequence[Leg],
-        channels: Sequence[PositionChannel],
-        bus: EncoderBus,
-        timeout_s: float,
-        *,
-        signed: bool,
-    ) -> None:
-        self._legs = legs
-        self._channels = channels
-        self._bus = bus
-        self._timeout_s = timeout_s
-        self._signed = signed
-        self._outstanding = [0] * len(legs)
-        self._counts: list[int | None] = [None] * len(legs)
-        self._lengths = [0] * len(legs)
-        self._index = {channel.cob_id: index for index, channel in enumerate(channels)}
-        self._foreign_sync = False
-        for channel in channels:
-            bus.network.subscribe(channel.cob_id, self._on_position)
-        bus.network.subscribe(SYNC, self._on_foreign_sync)
+    legs: Sequence[Leg]
+    channels: Sequence[PositionChannel]
+    bus: EncoderBus
+    timeout_s: float
+    signed: bool
+    _foreign_sync: bool = False
+
+    def __post_init__(self) -> None:
+        self._outstanding = [0] * len(self.legs)
+        self._counts: list[int | None] = [None] * len(self.legs)
+        self._lengths = [0] * len(self.legs)
+        self._index = {channel.cob_id: index for index, channel in enumerate(self.channels)}
+        for channel in self.channels:
+            self.bus.network.subscribe(channel.cob_id, self._on_position)
+        self.bus.network.subscribe(SYNC, self._on_foreign_sync)
 
     def sample(self) -> tuple[int, ...]:
         """One complete sample, the counts of all legs, after at most ``MAX_SYNCS`` SYNCs.
@@ -167,29 +161,29 @@ class SyncSampler:
         from before would pass for one to its SYNC.
         """
         for _ in range(MAX_SYNCS):
-            is_synchronized = self._is_complete() or self._bus.wait_for(self._is_complete, self._timeout_s)
-            with self._bus.condition:
+            is_synchronized = self._is_complete() or self.bus.wait_for(self._is_complete, self.timeout_s)
+            with self.bus.condition:
                 # Late responses that do not come are written off; each leg owes one to this SYNC.
                 self._outstanding = [min(outstanding, 0) + 1 for outstanding in self._outstanding]
-            self._bus.network.send_message(SYNC, b"")
-            if not self._bus.wait_for(self._is_complete, self._timeout_s):
+            self.bus.network.send_message(SYNC, b"")
+            if not self.bus.wait_for(self._is_complete, self.timeout_s):
                 continue
             if not is_synchronized:
-                self._bus.listen(LATE_RESPONSE_TIMEOUTS * self._timeout_s)
+                self.bus.listen(LATE_RESPONSE_TIMEOUTS * self.timeout_s)
             return self._received()
-        silent = [leg for leg, left in zip(self._legs, self._outstanding, strict=True) if left > 0]
-        what = f"no response to SYNC within {self._timeout_s:g} s, {MAX_SYNCS} times"
-        raise silent_nodes(what, silent, all_legs=len(silent) == len(self._legs))
+        silent = [leg for leg, left in zip(self.legs, self._outstanding, strict=True) if left > 0]
+        what = f"no response to SYNC within {self.timeout_s:g} s, {MAX_SYNCS} times"
+        raise silent_nodes(what, silent, all_legs=len(silent) == len(self.legs))
 
     def check(self) -> None:
         """Raise if a leg sent more positions than there were SYNCs, or another master sends SYNC."""
         if min(self._outstanding) < 0:
-            leg = self._legs[self._outstanding.index(min(self._outstanding))]
+            leg = self.legs[self._outstanding.index(min(self._outstanding))]
             raise duplicated_node("sent more positions than there were SYNCs", leg)
         if self._foreign_sync:
             raise BusError(
                 "another master sends SYNC on it",
-                subject=self._bus.name,
+                subject=self.bus.name,
                 action="Give the encoders a bus of their own, or switch the other master off",
             )
 
@@ -200,23 +194,23 @@ class SyncSampler:
         counts = tuple(count for count in self._counts if count is not None)
         if len(counts) < len(self._counts):
             index = self._counts.index(None)
-            needed = self._channels[index].length
+            needed = self.channels[index].length
             raise DeviceError(
                 f"sent {self._lengths[index]} bytes where its position needs {needed}",
-                subject=self._legs[index].subject,
+                subject=self.legs[index].subject,
                 action="Open the encoders again; if it stays so, use another device",
             )
         return counts
 
     def _on_position(self, can_id: int, data: bytearray, _timestamp: float) -> None:
         index = self._index[can_id]
-        channel = self._channels[index]
+        channel = self.channels[index]
         is_whole = len(data) >= channel.length
         self._lengths[index] = len(data)
-        self._counts[index] = channel.counts(bytes(data), signed=self._signed) if is_whole else None
+        self._counts[index] = channel.counts(bytes(data), signed=self.signed) if is_whole else None
         self._outstanding[index] -= 1
         if self._is_complete():
-            self._bus.condition.notify_all()
+            self.bus.condition.notify_all()
 
     def _on_foreign_sync(self, _can_id: int, _data: bytearray, _timestamp: float) -> None:
         self._foreign_sync = True

@@ -71,7 +71,7 @@ class ModbusPort(RequestPort):
             )
             # Not by its own connect(), which gives no cause and configures a pseudo-terminal twice.
             port: Any = opened_port(
-                self.url, line, self.subject, self._closing, client.inter_byte_timeout or None
+                self.url, line, self.subject, self.closing, client.inter_byte_timeout or None
             )
             port.write = partial(_sent, port.write)
             client.socket, client.recv = port, self._next_bytes
@@ -82,15 +82,11 @@ class ModbusPort(RequestPort):
 
     def exchange(self, request: bytes, _terminator: bytes, timeout_s: float) -> bytes:
         """Read registers; a device that answers with an exception is a ``RefusedRequest``."""
-        self.require_not_closed()
-        if self._client is None:
-            raise lost_port(self.subject, self.url, "it is not open")
         device, function, address, count = REQUEST.unpack(request)
-        client, self._received = self._client, b""
-        client.comm_params.timeout_connect = timeout_s
-        read = client.read_holding_registers if function == HOLDING else client.read_input_registers
-        with self._port_errors():
-            self._drop_surplus()
+        self._received = b""
+        with self._requesting() as client:
+            client.comm_params.timeout_connect = timeout_s
+            read = client.read_holding_registers if function == HOLDING else client.read_input_registers
             answer = read(address, count=count, device_id=device)
         if answer.isError():
             code = answer.exception_code
@@ -107,12 +103,8 @@ class ModbusPort(RequestPort):
 
     def write_to_all(self, register: int, value: int) -> None:
         """Write a register of all devices at once, which none of them answers."""
-        self.require_not_closed()
-        if self._client is None:
-            raise lost_port(self.subject, self.url, "it is not open")
-        with self._port_errors():
-            self._drop_surplus()
-            self._client.write_register(register, value, device_id=BROADCAST, no_response_expected=True)
+        with self._requesting() as client:
+            client.write_register(register, value, device_id=BROADCAST, no_response_expected=True)
 
     def close(self) -> None:
         """Close the line; closing twice is harmless."""
@@ -151,7 +143,7 @@ class ModbusPort(RequestPort):
 
     def _clear(self) -> None:
         """Let late answers come and go: they look like those to the next request."""
-        self._closing.wait(self._worst_latency_s)
+        self.closing.wait(self.worst_latency_s)
         self.require_not_closed()
         if self._client.socket is not None:
             self._client.socket.reset_input_buffer()
@@ -165,9 +157,14 @@ class ModbusPort(RequestPort):
         return data if sending else data.lstrip(NUL)
 
     @contextmanager
-    def _port_errors(self) -> Iterator[None]:
+    def _requesting(self) -> Iterator[Any]:
+        """The client, with nothing on the line that came before; its failures are those of the line."""
+        self.require_not_closed()
+        if self._client is None:
+            raise lost_port(self.subject, self.url, "it is not open")
         try:
-            yield
+            self._drop_surplus()
+            yield self._client
         except self._modbus.exceptions.ModbusIOException as error:
             self._must_clear = True
             raise NoAnswer(self._received) from error

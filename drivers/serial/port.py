@@ -5,9 +5,8 @@ opening of a network port, which pyserial limits to five seconds.
 """
 
 import termios
-import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from math import inf
 
@@ -24,14 +23,13 @@ from drivers.serial.opening import (
 from drivers.serial.request_port import (
     FRAME_LIMIT,
     LINE_ENDS,
-    WORST_LATENCY_S,
     FrameLog,
     NoAnswer,
     RequestPort,
     cut_frame,
     is_copies,
 )
-from drivers.wire_trace import TraceRecorder, TrafficDirection
+from drivers.wire_trace import TrafficDirection
 from hexacell.clock import Patience
 from hexacell.errors import DeviceError
 
@@ -55,15 +53,8 @@ class SerialPort(RequestPort):
         log: the frames that came unasked, of a device that sends by itself.
     """
 
-    def __init__(
-        self,
-        url: str,
-        settings: Mapping[str, object],
-        closing: threading.Event,
-        recorder: TraceRecorder | None = None,
-        worst_latency_s: float = WORST_LATENCY_S,
-    ) -> None:
-        super().__init__(url, settings, closing, recorder, worst_latency_s)
+    def __post_init__(self) -> None:
+        super().__post_init__()
         self._parity = in_software(self._settings)
         self._port: serial.Serial | None = None
         self._asked_at = 0.0
@@ -79,7 +70,7 @@ class SerialPort(RequestPort):
         if self._port is not None and not self._is_alive(self._port):
             self.close()
         if self._port is None:
-            self._port = opened_port(self.url, self._settings, self.subject, self._closing)
+            self._port = opened_port(self.url, self._settings, self.subject, self.closing)
             have_terminal_check(self._port, self._settings)
             self.open_count += 1
             self._silence_s, self._surplus, self._last_frame, self._careful = 0.0, b"", b"", 0
@@ -184,7 +175,7 @@ class SerialPort(RequestPort):
             if cut := cut_frame(received, request, terminator):
                 self._last_frame, self._surplus = cut
                 return self._last_frame
-        self._silence_s = self._worst_latency_s
+        self._silence_s = self.worst_latency_s
         raise NoAnswer(received)
 
     def _read(self, port: serial.Serial) -> bytes:

@@ -97,17 +97,16 @@ class NoAnswer(Exception):
         super().__init__(received)
 
 
+@dataclass(eq=False)
 class RequestPort(ABC):
     """A line with requests and answers, used from one thread.
 
-    Args:
+    Attributes:
         url: the line, as the cell file names it.
         settings: of the line, from the cell file and the protocol.
         closing: set by another thread to interrupt every wait.
         recorder: gets all bytes.
         worst_latency_s: how long nothing is asked after a time-out, s.
-
-    Attributes:
         subject: the device that messages name.
         unsolicited: bytes that came without a request or too late; the latest ones only.
         open_count: how often the line has been opened.
@@ -115,24 +114,20 @@ class RequestPort(ABC):
             before may have been such bytes.
     """
 
-    def __init__(
-        self,
-        url: str,
-        settings: Mapping[str, object],
-        closing: threading.Event,
-        recorder: TraceRecorder | None = None,
-        worst_latency_s: float = WORST_LATENCY_S,
-    ) -> None:
-        self.url = url
-        self.subject = f"port {url}"
+    url: str
+    settings: Mapping[str, object]
+    closing: threading.Event
+    recorder: TraceRecorder | None = None
+    worst_latency_s: float = WORST_LATENCY_S
+    open_count: int = 0
+    surplus_count: int = 0
+    _must_clear: bool = False
+
+    def __post_init__(self) -> None:
+        self.subject = f"port {self.url}"
         self.unsolicited: deque[bytes] = deque(maxlen=64)
-        self.open_count = 0
-        self.surplus_count = 0
-        self._settings = dict(settings)
-        self._closing = closing
-        self._wire = LineRecord(url, recorder)
-        self._worst_latency_s = worst_latency_s
-        self._must_clear = False
+        self._settings = dict(self.settings)
+        self._wire = LineRecord(self.url, self.recorder)
 
     @abstractmethod
     def open(self) -> int:
@@ -163,7 +158,7 @@ class RequestPort(ABC):
 
     def require_not_closed(self) -> None:
         """Raise if this program has closed the line or is closing it."""
-        if self._closing.is_set():
+        if self.closing.is_set():
             raise PortLost(f"port {self.url} is closed", subject=self.subject)
 
     def _record(self, direction: TrafficDirection, data: bytes) -> None:

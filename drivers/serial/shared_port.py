@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 
 from drivers.serial.port import SerialPort
@@ -105,15 +106,13 @@ class SharedSerialPort:
         self.line.subject = f"gauge {names[0]}" if len(names) == 1 else f"gauges {', '.join(names)}"
 
 
+@dataclass(eq=False, kw_only=True)
 class SharedSerialPorts:
     """The serial ports of one cell; gauges behind one multiplexer share a port."""
 
-    def __init__(
-        self, *, trace: TraceRecorder | None = None, worst_latency_s: float = WORST_LATENCY_S
-    ) -> None:
-        self._trace = trace
-        self._worst_latency_s = worst_latency_s
-        self._ports: dict[str, SharedSerialPort] = {}
+    trace: TraceRecorder | None = None
+    worst_latency_s: float = WORST_LATENCY_S
+    _ports: dict[str, SharedSerialPort] = field(default_factory=dict)
 
     def acquire(
         self,
@@ -133,7 +132,7 @@ class SharedSerialPorts:
             FileError: Another gauge uses the port with other settings, alone, or on this channel.
         """
         port = self._ports.get(url) or SharedSerialPort(
-            url, settings, self._trace, self._worst_latency_s, factory
+            url, settings, self.trace, self.worst_latency_s, factory
         )
         port.add_gauge(gauge, settings, channel)
         self._ports[url] = port

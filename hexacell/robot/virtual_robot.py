@@ -1,6 +1,7 @@
 """Virtual robots: geometries drawn within the tolerances, moved by the real controller's geometry."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from hexacell.kinematics.mechanism import Mechanism, inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import singularity_margin
-from hexacell.measurements.records import Record, deviation_of, joints_of
+from hexacell.measurements.records import Directions, Record, deviation_of, joints_of
 from hexacell.motion.arrival import UNKNOWN, arrival_directions, least_way
 from hexacell.motion.trajectory import interpolate_line, trace_path
 from hexacell.robot.model import Robot
@@ -31,6 +32,7 @@ WEAR_SHARE = 0.1
 """Share of the tolerances by which a robot may have drifted since it was calibrated."""
 
 
+@dataclass(eq=False)
 class VirtualRobot:
     """Goes where its controller commands it, on its own geometry, and answers with records.
 
@@ -40,32 +42,23 @@ class VirtualRobot:
         model: what is known of it: mechanism, commanding geometry, noise and limits.
         truth: its geometry, in the mechanism's frame convention.
         stops: one standard deviation of where a joint stops beside its command, as its encoder shows it, in
-            its unit; by default what the model's noise states.
+            its unit; None for what the model's noise states.
         unseen: likewise beside what its encoder shows.
         smallest_margin: the smallest singularity margin of the true geometry along all moves so far.
     """
 
-    def __init__(
-        self,
-        model: Robot,
-        truth: Geometry,
-        random: np.random.Generator | None = None,
-        *,
-        stops: float | None = None,
-        unseen: float = 0.0,
-    ) -> None:
-        self.model = model
-        self.truth = truth
-        self.stops = model.noise.stops if stops is None else stops
-        self.unseen = unseen
-        self.smallest_margin = np.inf
-        self._random = random or np.random.default_rng()
-        self._command: Pose | None = None
-        self._actual: PoseBatch | None = None
-        self._shown: Array = np.full((1, 6), np.nan)
-        self._joints_commanded: Array | None = None
-        self._directions = UNKNOWN
-        self._zero: Array | None = None
+    model: Robot
+    truth: Geometry
+    random: np.random.Generator = field(default_factory=np.random.default_rng)
+    stops: float | None = None
+    unseen: float = 0.0
+    smallest_margin: float = np.inf
+    _command: Pose | None = None
+    _actual: PoseBatch | None = None
+    _shown: Array = field(default_factory=lambda: np.full((1, 6), np.nan))
+    _joints_commanded: Array | None = None
+    _directions: Directions = UNKNOWN
+    _zero: Array | None = None
 
     def actual_poses(self, commands: PoseBatch) -> ActualPoses:
         """Where it would go for n commands in the convention's frames; itself it does not move."""
@@ -151,8 +144,8 @@ class VirtualRobot:
         """
         model = self.model
         shown = model.frames.base.T @ self._actual_pose.positions[0]
-        shown = shown + model.noise.gauges_mm * self._random.standard_normal(3)
-        joints = self._shown[0] + model.noise.encoders * self._random.standard_normal(6)
+        shown = shown + model.noise.gauges_mm * self.random.standard_normal(3)
+        joints = self._shown[0] + model.noise.encoders * self.random.standard_normal(6)
         self._zero = shown if self._zero is None else self._zero
         deviation = deviation_of(shown - self._zero)
         return Record(point, orientation, self.command, joints_of(joints), deviation, self._directions)
@@ -179,14 +172,15 @@ class VirtualRobot:
             ReachError: no pose belongs to where the joints stopped.
         """
         model, joints = self.model, way[[-1]]
-        least = least_way(model.mechanism.words.joint_unit, self.stops)
+        stops = model.noise.stops if self.stops is None else self.stops
+        least = least_way(model.mechanism.words.joint_unit, stops)
         self._directions = arrival_directions(way, self._directions, least)
         self._command, self._actual, self._shown = command, poses, joints
         self._joints_commanded = joints
-        if not (self.stops or self.unseen):
+        if not (stops or self.unseen):
             return
-        scatter = self._random.standard_normal((2, 1, 6))
-        self._shown = joints + self.stops * scatter[0]
+        scatter = self.random.standard_normal((2, 1, 6))
+        self._shown = joints + stops * scatter[0]
         found = continue_solution(
             model.mechanism,
             self.truth,

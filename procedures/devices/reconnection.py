@@ -49,23 +49,19 @@ async def reconnect(devices: Devices, error: HexacellError, known: Sequence[Devi
 def require_known(found: Iterable[DeviceIdentity], known: Sequence[DeviceIdentity]) -> None:
     """Refuse devices with another protocol, serial number or description than the run began with.
 
-    Raises ``DeviceReplaced``, which names both. Devices that were not known before pass.
+    Raises ``DeviceReplaced``, which names both. Devices that were not known before pass. Settings and port
+    count where both are known.
     """
     before = {identity.name: identity for identity in known}
     for now in found:
         then = before.get(now.name, now)
-        if _differs(then, now):
+        unknown = {name: getattr(now, name) for name in ("settings", "port") if not getattr(then, name)}
+        if replace(then, **unknown) != now:
             raise DeviceReplaced(
                 f"{_words(now)} answers where the run was begun with {_words(then)}",
                 subject=now.name,
                 action="Connect the one that was there, or begin a new run",
             )
-
-
-def _differs(then: DeviceIdentity, now: DeviceIdentity) -> bool:
-    """Whether it is another device; settings and port count where both are known."""
-    unknown = {name: getattr(now, name) for name in ("settings", "port") if not getattr(then, name)}
-    return replace(then, **unknown) != now
 
 
 def _concerns(mounted: MountedGauge, errors: Sequence[HexacellError]) -> bool:

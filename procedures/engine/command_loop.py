@@ -5,7 +5,7 @@ The flags that the commands set decide the status of the engine.
 
 import asyncio
 from collections.abc import Callable, Coroutine
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import reduce
 from typing import Any, TypeVar
@@ -86,28 +86,23 @@ class StepCancelled(Exception):
     """A command cancelled the coroutine; the flags say which."""
 
 
+@dataclass(eq=False)
 class CommandLoop:
     """Takes commands out of the queue and keeps the flags that they set.
 
     ``state`` gives the present state of the run; ``reject`` is called with each refused command, and why.
     """
 
-    def __init__(
-        self,
-        queue: CommandQueue,
-        broker: QuestionBroker,
-        *,
-        state: Callable[[], RunState],
-        reject: Callable[[Command, str], None],
-    ) -> None:
-        self.flags = EngineFlags()
-        self.watchers: list[Callable[[Status], None]] = []
-        self._queue = queue
-        self._broker = broker
-        self._state = state
-        self._reject = reject
-        self._invalidations: list[Invalidation] = []
-        broker.watchers.append(lambda question: self.set_flags(asking=question is not None))
+    queue: CommandQueue
+    broker: QuestionBroker
+    state: Callable[[], RunState]
+    reject: Callable[[Command, str], None]
+    flags: EngineFlags = EngineFlags()
+    watchers: list[Callable[[Status], None]] = field(default_factory=list)
+    _invalidations: list[Invalidation] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.broker.watchers.append(lambda question: self.set_flags(asking=question is not None))
 
     def set_flags(self, **flags: Any) -> None:  # noqa: ANN401 - the fields of EngineFlags
         """Set flags; watchers are called if the status changes by that."""
@@ -136,11 +131,11 @@ class CommandLoop:
 
     async def take_one(self) -> None:
         """Wait for a command and take it."""
-        self._take(await self._queue.next())
+        self._take(await self.queue.next())
 
     def catch_up(self) -> None:
         """Take the commands that wait."""
-        for command in self._queue.take():
+        for command in self.queue.take():
             self._take(command)
 
     def take_invalidations(self) -> list[Invalidation]:
@@ -149,7 +144,7 @@ class CommandLoop:
         return taken
 
     async def _until_cancelled(self) -> None:
-        while not self._take(await self._queue.next()):
+        while not self._take(await self.queue.next()):
             pass
 
     def _take(self, command: Command) -> bool:
@@ -170,21 +165,21 @@ class CommandLoop:
                 return command.at_once or flags.asking
             case Resume() if flags.paused or flags.pausing:
                 self.set_flags(pausing=False, at_once=False, paused=False)
-            case Answer() if self._broker.answer(command.value):
+            case Answer() if self.broker.answer(command.value):
                 pass
             case Undo() | MeasureAgain():
                 return self._invalidate(command) and flags.asking and flags.fault is None
             case _:
-                self._reject(command, _refusal(command, flags))
+                self.reject(command, _refusal(command, flags))
         return False
 
     def _invalidate(self, command: Undo | MeasureAgain) -> bool:
         """Request what the command asks for; whether it is possible."""
-        expected = reduce(apply, self._invalidations, self._state())
+        expected = reduce(apply, self._invalidations, self.state())
         try:
             self._invalidations.append(invalidation_event(command, expected))
         except UsageError as refusal:
-            self._reject(command, str(refusal))
+            self.reject(command, str(refusal))
             return False
         return True
 

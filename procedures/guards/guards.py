@@ -12,6 +12,7 @@ from __future__ import annotations
 import asyncio
 from collections import defaultdict
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
@@ -47,6 +48,7 @@ STOP_GRACE_S = 0.5
 """How long a motion may take to end after a stop before it is cancelled, s of real time."""
 
 
+@dataclass(eq=False)
 class Guards:
     """The guards of one cell.
 
@@ -54,20 +56,17 @@ class Guards:
     end of a move.
     """
 
-    def __init__(
-        self,
-        settings: CellSettings,
-        devices: Devices,
-        clock: CellClock,
-        folder: Path,
-        config: CurrentConfig,
-    ) -> None:
-        self.position = PositionCheck(settings, devices, clock, config)
-        self._settings = settings
-        self._devices = devices
-        self._clock = clock
-        self.supervisor = MotionSupervisor(devices.controller, clock, folder, settings.guards.free_disk_mb)
-        self._following = settings.guards.following
+    settings: CellSettings
+    devices: Devices
+    clock: CellClock
+    folder: Path
+    config: CurrentConfig
+
+    def __post_init__(self) -> None:
+        guards, controller = self.settings.guards, self.devices.controller
+        self.position = PositionCheck(self.settings, self.devices, self.clock, self.config)
+        self.supervisor = MotionSupervisor(controller, self.clock, self.folder, guards.free_disk_mb)
+        self._following = guards.following
 
     def allow_following(self, limit: float) -> None:
         """Let joints stop as far from their commands as this, in their unit."""
@@ -85,10 +84,14 @@ class Guards:
         gauges = self._watched_gauges(watched)
         pollers = self._pollers(controller=True, gauges=gauges)
         limits = self._limits(zero_mm=watched.zero_mm)
+
+        async def go() -> EncoderSample:
+            for target, duration_s in moves:
+                await self.devices.controller.move(target, duration_s)
+            return await self.devices.read_encoders()
+
         try:
-            reached = await self.supervisor.supervise(
-                lambda: self._go(moves), pollers, limits, STOP_GRACE_S
-            )
+            reached = await self.supervisor.supervise(go, pollers, limits, STOP_GRACE_S)
         except MotionInterrupted:
             # Where the forward kinematics failed, the robot is not where this error says that it stopped.
             await self.locate()
@@ -110,7 +113,7 @@ class Guards:
 
     async def at_standstill(self, action: Supervised[Result]) -> Result:
         """Run an action during which the robot must stay at standstill."""
-        limits = self._limits(rest=self._settings.guards.following)
+        limits = self._limits(rest=self.settings.guards.following)
         return await self.supervisor.supervise(action, self._pollers(controller=True), limits)
 
     async def during_readings(self, action: Supervised[Result]) -> Result:
@@ -123,7 +126,7 @@ class Guards:
 
         Encoders that it reads have no position meanwhile.
         """
-        pollers = self._pollers(encoders=not self._settings.encoders.are_of_controller)
+        pollers = self._pollers(encoders=not self.settings.encoders.are_of_controller)
         await self.supervisor.supervise(order, pollers, self._limits(), STOP_GRACE_S)
 
     async def require_reloaded(self) -> None:
@@ -132,28 +135,23 @@ class Guards:
 
     async def _arrival_trip(self, commanded: Array, reached: EncoderSample) -> Trip | None:
         """A joint is not where it was commanded (6,), or the controller is wrong about where it is."""
-        words = self._settings.mechanism.words
+        words = self.settings.mechanism.words
         following = following_error(commanded, np.array(reached.positions), self._following, words)
         found = await self.position.read(reached, following=self._following)
         return following if following and found.odd is PositionSource.ENCODERS else found.trip or following
 
-    async def _go(self, moves: Sequence[tuple[Pose, float]]) -> EncoderSample:
-        for target, duration_s in moves:
-            await self._devices.controller.move(target, duration_s)
-        return await self._devices.read_encoders()
-
     def _limits(self, rest: float | None = None, zero_mm: ThreeNumbers | None = None) -> GuardLimits:
-        guards = self._settings.guards
-        plate = gauge_travel_of(self._settings).room(zero_mm).widened(guards.plate_margin_mm)
-        return GuardLimits(guards.stale_s, plate, rest, self._settings.mechanism.words)
+        guards = self.settings.guards
+        plate = gauge_travel_of(self.settings).room(zero_mm).widened(guards.plate_margin_mm)
+        return GuardLimits(guards.stale_s, plate, rest, self.settings.mechanism.words)
 
     def _pollers(
         self, *, controller: bool = False, encoders: bool = True, gauges: tuple[WatchedGauge, ...] = ()
     ) -> PolledDevices:
-        devices, guards = self._devices, self._settings.guards
-        watched = WatchedController(devices, self._clock, guards.following, guards.stale_s)
+        devices, guards = self.devices, self.settings.guards
+        watched = WatchedController(devices, self.clock, guards.following, guards.stale_s)
         # Gauges behind one multiplexer share a port and so a line.
-        ports = {f"gauge {one.name}": one.port or one.name for one in self._settings.gauges}
+        ports = {f"gauge {one.name}": one.port or one.name for one in self.settings.gauges}
         lines: defaultdict[str, LineActivity] = defaultdict(LineActivity)
         return PolledDevices(
             gauges=tuple(
@@ -169,8 +167,8 @@ class Guards:
         if zero_mm is None or not watched.is_watched:
             return ()
         return tuple(
-            WatchedGauge(self._devices, mounted, zero_mm[mounted.axis.index])
-            for mounted in self._devices.gauges
+            WatchedGauge(self.devices, mounted, zero_mm[mounted.axis.index])
+            for mounted in self.devices.gauges
         )
 
 

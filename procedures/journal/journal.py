@@ -88,7 +88,8 @@ def read_entries(path: Path, longest_line: int = LONGEST_LINE) -> tuple[Entry, .
     """All events of a journal with number and time of each; raises ``FileError``."""
     with (
         atomic_files.os_errors("cannot be read", path),
-        open(path, "rb", opener=_open_without_waiting) as stream,
+        # A pipe would be waited for.
+        open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as stream,
     ):
         return _parse(path, stream, longest_line)[0]
 
@@ -173,10 +174,6 @@ class Journal(AbstractContextManager["Journal"]):
 
     def _cannot_open(self, error: OSError) -> FileError:
         return atomic_files.os_error_to_file_error("the journal cannot be opened", self.path, error)
-
-
-def _open_without_waiting(path: str, flags: int) -> int:
-    return os.open(path, flags | os.O_NONBLOCK)  # a pipe would be waited for
 
 
 def _write_whole(descriptor: int, data: bytes) -> None:

@@ -178,6 +178,7 @@ class Scope(StrEnum):
         )
 
 
+@dataclass(eq=False)
 class Replayer:
     """Replays one recorded run.
 
@@ -186,20 +187,13 @@ class Replayer:
         report: gets the findings.
     """
 
-    def __init__(
-        self,
-        executor: RecordedStepExecutor,
-        report: ReplayReport,
-        scope: Scope = Scope.ALL,
-        tolerance: float = TOLERANCE,
-    ) -> None:
-        self._executor = executor
-        self._scope = scope
-        self._tolerance = tolerance
-        self._state = RunState()
-        self._current_step: Step | None = None
-        self._line = 0
-        self.report = report
+    executor: RecordedStepExecutor
+    report: ReplayReport
+    scope: Scope = Scope.ALL
+    tolerance: float = TOLERANCE
+    _state: RunState = field(default_factory=RunState)
+    _current_step: Step | None = None
+    _line: int = 0
 
     async def replay(self, entries: Sequence[Entry]) -> None:
         """Replay all entries."""
@@ -211,7 +205,7 @@ class Replayer:
     async def _compare(self, event: events.Event, before: Sequence[Entry]) -> None:
         match event:
             case events.StepBegun():
-                if self._scope.decides:
+                if self.scope.decides:
                     self.report.decisions += 1
                     self._compare_with(Aspect.DECISION, event.step.key, event.step, await self._decided())
                 self._current_step = event.step
@@ -229,17 +223,17 @@ class Replayer:
             self._current_step = None
 
     async def _decided(self) -> Step | Exception | None:
-        return await _result_or_error(asyncio.to_thread(self._executor.next_step, self._state))
+        return await _result_or_error(asyncio.to_thread(self.executor.next_step, self._state))
 
     async def _outcome(self, step: Step, event: events.Event) -> None:
-        if not self._scope.derives(step):
+        if not self.scope.derives(step):
             return
         self.report.results += 1
-        self._executor.recorded.outcome = event
-        derived = await _result_or_error(self._executor.perform(step, self._state))
+        self.executor.recorded.outcome = event
+        derived = await _result_or_error(self.executor.perform(step, self._state))
         self._compare_with(Aspect.RESULT, step.key, event, derived)
         if isinstance(event, events.RecordTaken):
-            encoders = self._executor.cell.settings.encoders
+            encoders = self.executor.cell.settings.encoders
             if change := counts_mismatch(event.reading, encoders):
                 self._add_difference(Aspect.RESULT, step.key, change)
 
@@ -249,14 +243,14 @@ class Replayer:
             self.report.taken += 1
         elif self._current_step is None:
             await self._undecided(event)
-        elif self._current_step.is_reproducible and self._scope.derives(self._current_step):
+        elif self._current_step.is_reproducible and self.scope.derives(self._current_step):
             await self._outcome(self._current_step, event)
         else:
             self.report.taken += 1
 
     async def _undecided(self, event: events.Interrupted) -> None:
         """A failure of a decision, or between two steps."""
-        decided = await self._decided() if self._scope.decides else None
+        decided = await self._decided() if self.scope.decides else None
         if isinstance(decided, Exception):
             self.report.decisions += 1
             self._compare_with(Aspect.DECISION, "deciding", event, decided)
@@ -265,7 +259,7 @@ class Replayer:
 
     async def _end(self, event: events.Ended, before: Sequence[Entry]) -> None:
         """The engine must find no next step and end the run with the same event."""
-        if self._scope is not Scope.ALL:
+        if self.scope is not Scope.ALL:
             self.report.taken += 1
             return
         self.report.results += 1
@@ -273,10 +267,10 @@ class Replayer:
         if left is not None:
             self._compare_with(Aspect.DECISION, "end", event, left)
             return
-        path = self._executor.folder.journal
+        path = self.executor.folder.journal
         path.write_bytes(b"".join(encode(entry) for entry in before))
         with Journal(path) as journal:
-            ended = await _result_or_error(Engine(self._executor, journal).run())
+            ended = await _result_or_error(Engine(self.executor, journal).run())
         self._compare_with(Aspect.RESULT, "end", event, ended)
 
     def _compare_with(self, aspect: Aspect, place: str, recorded: BaseModel, found: object) -> None:
@@ -287,7 +281,7 @@ class Replayer:
         if type(found) is not type(recorded) or not isinstance(found, BaseModel):
             self._add_difference(aspect, place, Change("", _describe(recorded), _describe(found)))
             return
-        for change in changes(recorded, found, self._tolerance):
+        for change in changes(recorded, found, self.tolerance):
             self._add_difference(Aspect.WORDS if is_wording(change) else aspect, place, change)
 
     def _add_difference(self, aspect: Aspect, place: str, change: Change) -> None:

@@ -61,7 +61,7 @@ class LengthSteps:
                 action="Check first_seat, direction and distance_mm in [length_check], and how the fixture "
                 "lies; then mount the gauges there again",
             )
-        zero = self._zero(state, key)
+        zero = self.sets.known(state, key)[1]  # where the ball is with the gauges at zero
         if step := self.sets.due_first(state, key, zero):
             return step
         if (orientation := measured.next_orientation) > self._records:
@@ -89,7 +89,3 @@ class LengthSteps:
         tilt = self.fixture.tilt_deg if tilts > 0 else 0.0
         x, y, z = position.tolist()
         return Pose(x, y, z, float(tilt * np.cos(about)), float(tilt * np.sin(about)))
-
-    def _zero(self, state: RunState, key: SetKey) -> Array | None:
-        """Where the ball is (3,), mm, with the gauges at zero, by what is known now."""
-        return self.sets.known(state, key)[1]

@@ -13,7 +13,6 @@ from hexacell.campaign.decisions import FinishPoint, MeasurePose, StartPoint
 from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.campaign.planner import Plan
 from hexacell.errors import HexacellError
-from hexacell.kinematics.rotations import Array
 from hexacell.noise.noise_assessment import visits_agree
 from procedures.calibration.calibration import campaign_state
 from procedures.calibration.repeatability import noise_readings
@@ -131,17 +130,18 @@ class IdentificationSteps:
         if state.position_unknown:
             return Locate()
         require_zero(state, key)
-        if step := self.sets.due_first(state, key, self._ball(state, key)):
+        known = self._known(state, key)
+        ball = None if known is None else known[1].reference
+        if step := self.sets.due_first(state, key, ball):
             return step
-        measuring_noise = self.noise.next_step(state, key, self._known(state, key))
+        measuring_noise = self.noise.next_step(state, key, known)
         # With several records to be taken again, one is, before the robot moves to the next of them.
         orientation, pose = measured.again[0] if measured.again else (None, None)
         if step := measuring_noise or self.sets.at_pose(state, key, orientation):
             return step
         if orientation is None or pose is None:
             return None
-        move = Move(at=key, orientation=orientation, pose=pose)
-        return self.sets.towards(state, move, self._ball(state, key))
+        return self.sets.towards(state, Move(at=key, orientation=orientation, pose=pose), ball)
 
     def _applies_provisional(self, state: RunState) -> bool:
         """Whether the controller gets a provisional geometry now, between two points."""
@@ -162,11 +162,6 @@ class IdentificationSteps:
     def way_back(self, state: RunState, key: SetKey) -> Step:
         """The next move to the reference of a set; raises ``HexacellError`` if no safe path leads there."""
         return self.sets.way_back(state, key, self._known(state, key))
-
-    def _ball(self, state: RunState, key: SetKey) -> Array | None:
-        """Where the ball was when the set's gauges were zeroed (3,), mm, if the records determine it."""
-        known = self._known(state, key)
-        return None if known is None else known[1].reference
 
     def _known(self, state: RunState, key: SetKey) -> Known | None:
         """The belief by now and the gauges' zero under it; None if there is no estimate."""

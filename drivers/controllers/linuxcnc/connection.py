@@ -7,6 +7,7 @@ import re
 from collections import deque
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, nullcontext, suppress
+from dataclasses import dataclass, field
 from typing import Self
 
 from drivers.controllers.linuxcnc import protocol
@@ -79,6 +80,7 @@ class SendArbiter:
             pass
 
 
+@dataclass(eq=False)
 class Connection:
     """A connected and greeted client.
 
@@ -93,24 +95,20 @@ class Connection:
         send_turn: entered to send a command; see :class:`SendArbiter`. Unrestricted at first.
     """
 
-    def __init__(
-        self,
-        settings: ControllerSettings,
-        timeouts: protocol.Timeouts,
-        recorder: TraceRecorder | None,
-        reader: asyncio.StreamReader,
-        writer: asyncio.StreamWriter,
-    ) -> None:
-        self.server = ""
-        self.send_turn: Callable[[], AbstractAsyncContextManager[None]] = nullcontext
-        self.settings, self.subject = settings, protocol.subject_of(settings)
-        self._wire = LineRecord(self.subject, recorder)
-        self._timeouts = timeouts
-        self._reader = reader
-        self._writer = writer
-        self._buffer = protocol.LineBuffer()
-        self._lines: deque[str] = deque()
-        self._outstanding: str | None = None
+    settings: ControllerSettings
+    timeouts: protocol.Timeouts
+    recorder: TraceRecorder | None
+    reader: asyncio.StreamReader
+    writer: asyncio.StreamWriter
+    server: str = ""
+    send_turn: Callable[[], AbstractAsyncContextManager[None]] = nullcontext
+    _buffer: protocol.LineBuffer = field(default_factory=protocol.LineBuffer)
+    _lines: deque[str] = field(default_factory=deque)
+    _outstanding: str | None = None
+
+    def __post_init__(self) -> None:
+        self.subject = protocol.subject_of(self.settings)
+        self._wire = LineRecord(self.subject, self.recorder)
 
     @classmethod
     async def open(
@@ -150,7 +148,7 @@ class Connection:
         async with self.send_turn():
             self._outstanding = command
             await self._write(line)
-            return await self._outstanding_response(command, timeout_s or self._timeouts.answer)
+            return await self._outstanding_response(command, timeout_s or self.timeouts.answer)
 
     async def collect_late_response(self) -> None:
         """Receive the outstanding response, if there is one.
@@ -159,8 +157,8 @@ class Connection:
             ConnectionLost: It does not come, or the server is gone: open another connection.
         """
         if self._outstanding is not None:
-            await self._outstanding_response(self._outstanding, self._timeouts.answer)
-        if self._reader.at_eof():
+            await self._outstanding_response(self._outstanding, self.timeouts.answer)
+        if self.reader.at_eof():
             raise ConnectionLost("closed the connection", subject=self.subject)
 
     async def take_control(self, timeout_s: float | None = None) -> None:
@@ -180,14 +178,14 @@ class Connection:
 
     async def close(self) -> None:
         """Close the connection; closing twice is harmless."""
-        self._writer.transport.abort()
+        self.writer.transport.abort()
         with suppress(OSError):
-            await self._writer.wait_closed()
+            await self.writer.wait_closed()
 
     async def _greet(self) -> None:
         password = self.settings.connect_password.get_secret_value()
         await self._write(protocol.encode_command(f"hello {password} {_CLIENT}", self.subject))
-        patience = _patience(self._timeouts.answer)
+        patience = _patience(self.timeouts.answer)
         try:
             while (line := await self._line(patience)).lower().startswith("warning:"):
                 pass
@@ -212,7 +210,7 @@ class Connection:
                 raise self._not_linuxcncrsh(line)
         await self._write(protocol.encode_command("set echo off", self.subject))
         with suppress(TimeoutError):  # the only response, if any, is the echo
-            await self._line(_patience(self._timeouts.explanation))
+            await self._line(_patience(self.timeouts.explanation))
         await self.request("set verbose on")
 
     def _not_linuxcncrsh(self, said: str) -> DeviceError:
@@ -225,8 +223,8 @@ class Connection:
     async def _write(self, line: bytes) -> None:
         self._record(TrafficDirection.SENT, line)
         try:
-            self._writer.write(line)
-            await self._writer.drain()
+            self.writer.write(line)
+            await self.writer.drain()
         except OSError as error:
             raise ConnectionLost("closed the connection", subject=self.subject) from error
 
@@ -237,7 +235,7 @@ class Connection:
                 if explanation := protocol.parse_explanation(line):
                     remarks.append(explanation)
                     left_s = patience.left_s(protocol.loop_time())
-                    patience = _patience(min(left_s, self._timeouts.explanation))
+                    patience = _patience(min(left_s, self.timeouts.explanation))
         except TimeoutError:
             if remarks:  # 2.10 refuses without a NAK while another client moves the machine
                 self._outstanding = None
@@ -259,7 +257,7 @@ class Connection:
             try:
                 async with asyncio.timeout(min(left_s, _SLICE_S)):
                     try:
-                        data = await self._reader.read(_CHUNK)
+                        data = await self.reader.read(_CHUNK)
                     except OSError:
                         data = b""
             except TimeoutError:

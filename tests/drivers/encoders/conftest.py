@@ -254,6 +254,6 @@ def short_timeout_bank(make_bank: Callable[..., Cia406Bank]) -> Cia406Bank:
 def short_timeout(bank: Cia406Bank, timeout_s: float = 0.1) -> Iterator[None]:
     assert bank._session is not None
     sampler = bank._session._sampler
-    before, sampler._timeout_s = sampler._timeout_s, timeout_s
+    before, sampler.timeout_s = sampler.timeout_s, timeout_s
     yield
-    sampler._timeout_s = before
+    sampler.timeout_s = before

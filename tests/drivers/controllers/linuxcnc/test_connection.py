@@ -94,7 +94,7 @@ async def test_a_server_that_was_started_anew_is_connected_to_again(play):
         [("get abs_act_pos", ARRIVED, play.HANG_UP)], [*play.OPENING[:-1], ("get abs_act_pos", HALF_WAY)]
     )
     assert (await pose_of(driver)).x == 10.0
-    await until(driver._session._channel.commands.connection._reader.at_eof)
+    await until(driver._session._channel.commands.connection.reader.at_eof)
     assert (await pose_of(driver)).x == 5.0
 
 

@@ -132,7 +132,7 @@ async def test_counts_are_what_the_cell_file_says(simulated, keys):
 async def test_faults_of_the_line_change_no_position(simulated, monkeypatch, fault):
     cell = simulated()
     await cell.driver.open()
-    monkeypatch.setattr(cell.driver._session._port, "_worst_latency_s", 0.1)
+    monkeypatch.setattr(cell.driver._session._port, "worst_latency_s", 0.1)
     cell.bank.faults(1)[fault](on=True)
     for step in range(SAMPLES):
         cell.positions = [0.25 * step] * 6
@@ -143,7 +143,7 @@ async def test_a_frame_from_before_is_never_taken_for_the_answer(simulated, monk
     cell = simulated()
     await cell.driver.open()
     await cell.driver.read()
-    monkeypatch.setattr(cell.driver._session._port, "_worst_latency_s", 0.1)
+    monkeypatch.setattr(cell.driver._session._port, "worst_latency_s", 0.1)
     cell.bank.faults(1)["unasked"](on=True)
     cell.positions = [5.0] * 6
     assert (await cell.driver.read()).positions == pytest.approx((5.0,) * 6)  # it was asked again
@@ -157,7 +157,7 @@ async def test_a_frame_from_before_is_never_taken_for_the_answer(simulated, monk
 async def test_a_late_answer_is_not_that_of_the_next_request(simulated, monkeypatch):
     cell = simulated(timeout_s=0.1)
     await cell.driver.open()
-    monkeypatch.setattr(cell.driver._session._port, "_worst_latency_s", 0.3)
+    monkeypatch.setattr(cell.driver._session._port, "worst_latency_s", 0.3)
     cell.bank.faults(1)["late"](on=True)
     with pytest.raises(SilentNodeError, match=r"does not answer within 0\.1 s"):
         await read_often(cell.driver)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from hexacell.kinematics.geometry import Geometry
@@ -47,6 +48,17 @@ class Bodies:
         shape = (len(joints), 6)
         return cls(
             sliders, np.broadcast_to(geometry["B"], (*shape, 3)), np.broadcast_to(geometry["l"], shape)
+        )
+
+    def __getitem__(self, rows: NDArray[np.intp]) -> Bodies:
+        return Bodies(self.sliders[rows], self.platform[rows], self.lengths[rows])
+
+    def moved_with(self, before: Bodies, after: Bodies) -> Bodies:
+        """These, changed as others change from ``before`` to ``after``."""
+        return Bodies(
+            self.sliders + after.sliders - before.sliders,
+            self.platform + after.platform - before.platform,
+            self.lengths + after.lengths - before.lengths,
         )
 
     def blend(self, other: Bodies, share: float) -> Bodies:

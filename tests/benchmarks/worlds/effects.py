@@ -25,7 +25,7 @@ class Stops:
         points: number of the gauges' place at each stop (n,), counted from 0.
         hours: when they are, since the machine was switched to work (n,).
         joints: what the controller drives the encoders to (n, 6), mm.
-        before: the same at the stop before (n, 6), mm.
+        previous: which of these stops the machine comes from (n,).
         seed: of what is random at these stops.
         at_work: whether the robot is at work, and nothing is measured.
     """
@@ -33,7 +33,7 @@ class Stops:
     points: NDArray[np.intp]
     hours: Array
     joints: Array
-    before: Array
+    previous: NDArray[np.intp]
     seed: tuple[int, ...] = ()
     at_work: bool = False
 
@@ -42,7 +42,7 @@ class Stops:
         """Stops one after the other from ``start``, hours, with time to move the gauges between points."""
         moved = np.diff(points, prepend=points[:1]) != 0
         hours = start + np.cumsum(RECORD_HOURS + MOVE_GAUGES_HOURS * moved)
-        return cls(points, hours, joints, np.roll(joints, 1, axis=0), seed)
+        return cls(points, hours, joints, np.roll(np.arange(len(points)), 1), seed)
 
     def __len__(self) -> int:
         return len(self.points)
@@ -50,7 +50,7 @@ class Stops:
     @property
     def directions(self) -> Array:
         """Whether each slider came from below, 1, or from above, -1 (n, 6)."""
-        return np.where(self.joints < self.before, -1.0, 1.0)
+        return np.where(self.joints < self.joints[self.previous], -1.0, 1.0)
 
     def of_effect(self, number: int) -> Stops:
         """The same with a random sequence of its own."""
@@ -118,6 +118,7 @@ class Effect:
             the platform's rotations (n, 3, 3).
         gauge_error: what gauges read too much (n, 3), mm, where the ball has moved by (n, 3) since zero.
         is_random: whether the platform is elsewhere at every visit of a pose.
+        has_memory: whether where it is may depend on where it comes from.
     """
 
     encoder_error: Callable[[Stops, Array], Array] = _nothing
@@ -127,6 +128,7 @@ class Effect:
     ball: Callable[[Stops, Array], Array] = _nothing
     gauge_error: Callable[[Stops, Array], Array] = _nothing
     is_random: bool = False
+    has_memory: bool = False
 
 
 def at_once(*effects: Effect, at_work: bool | None = None) -> Effect:
@@ -145,9 +147,12 @@ def at_once(*effects: Effect, at_work: bool | None = None) -> Effect:
 
         return hook
 
-    hooks = [one.name for one in fields(Effect) if one.name != "is_random"]
+    hooks = [one.name for one in fields(Effect) if one.name not in {"is_random", "has_memory"}]
     given: dict[str, Any] = {name: summed(name) for name in hooks}
-    return Effect(**given, is_random=any(one.is_random for one in effects))
+    is_random, has_memory = (
+        any(some) for some in zip(*((one.is_random, one.has_memory) for one in effects), strict=True)
+    )
+    return Effect(**given, is_random=is_random, has_memory=has_memory)
 
 
 def in_steps(values: Array, step: float) -> Array:

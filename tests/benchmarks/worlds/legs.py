@@ -1,6 +1,7 @@
 """Legs that stretch, joints that run out, and everything that is warmer than when it was drawn."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from enum import Enum
 
 import numpy as np
@@ -25,8 +26,12 @@ def elastic(compliances: Array, weight: Array, centre: Array) -> Effect:
 
 
 def play(half_mm: float | Array, weight: Array, centre: Array, soft_n: float = 0.3) -> Effect:
-    """Legs are +-``half_mm`` longer or shorter as they are pulled or pushed, softly within ``soft_n``."""
-    return _longer(lambda pull: half_mm * np.tanh(pull / soft_n), weight, centre)
+    """Legs are +-``half_mm`` longer or shorter as they are pulled or pushed, softly within ``soft_n``.
+
+    One that may lie on either side stays on that on which it is.
+    """
+    one_side = _longer(lambda pull: half_mm * np.tanh(pull / soft_n), weight, centre)
+    return replace(one_side, has_memory=bool(np.any(half_mm)))
 
 
 def run_out(size_mm: float, waves: Array, phases: Array) -> Effect:

@@ -20,8 +20,14 @@ from tests.benchmarks.worlds import frames
 from tests.benchmarks.worlds.closure import STAGES, Bodies, CannotCloseError, close, follow, slider_places
 from tests.benchmarks.worlds.effects import Effect, Posture, Stops
 
-SWEEPS = 4
-"""Displacements that depend on the pose, and the pose that depends on them, in turn."""
+SWEEPS, MOST_SWEEPS = 4, 60
+"""Displacements that depend on the pose, and the pose that depends on them, in turn, at least and at most."""
+
+BALANCED_MM = 1e-4
+"""By how much legs are longer or shorter than their forces have them, in the end."""
+
+ON_THE_WAY, STAGES_ON_THE_WAY = 8, 4
+"""Places between two stops at which the machine is in balance, and stages from one to the next."""
 
 STAGES_PER_MM = 4.0
 DRAWS = 32
@@ -151,7 +157,7 @@ class World:
         stops = replace(
             stops,
             hours=np.full(len(every), hour),
-            before=stops.joints[order],
+            previous=order,
             seed=(self.seed, 3),
             at_work=True,
         )
@@ -167,7 +173,7 @@ class World:
         if self.sent_further is None:
             return stops
         further = self.sent_further(poses, stops.joints, stops.directions)
-        return replace(stops, joints=stops.joints + further, before=stops.before + further)
+        return replace(stops, joints=stops.joints + further)
 
     def _reached(self, stops: Stops, commanding: Geometry, commands: PoseBatch) -> tuple[Array, PoseBatch]:
         """What the encoders show (n, 6), mm, and the poses of the platform."""
@@ -177,16 +183,47 @@ class World:
         shown = stops.joints + self.effect.following_error(stops)
         really = shown - self.effect.encoder_error(stops, shown)
         drawn = Bodies.of(self.truth, really)
-        bodies = drawn
-        for _ in range(SWEEPS):
-            shift = self.effect.shift(stops, Posture(really, bodies, poses))
+        if self.effect.has_memory:
+            return shown, self._arrived(stops, drawn, poses)
+        return shown, self._balanced(stops, drawn, drawn, poses)[1]
+
+    def _arrived(self, stops: Stops, drawn: Bodies, poses: PoseBatch) -> PoseBatch:
+        """The poses of a machine that comes from other stops, and meanwhile keeps its balance."""
+        bodies, balanced = self._balanced(stops, drawn, drawn, poses)
+        came = stops.previous
+        bodies, balanced, here = bodies[came], balanced[came], drawn[came]
+        left = here
+        for stage in range(1, ON_THE_WAY + 1):
+            there = left.blend(drawn, stage / ON_THE_WAY)
+            moved = bodies.moved_with(here, there)
+            balanced = follow(bodies, moved, balanced, STAGES_ON_THE_WAY)
+            bodies, balanced = self._balanced(stops, there, moved, balanced)
+            here = there
+        return balanced
+
+    def _balanced(
+        self, stops: Stops, drawn: Bodies, bodies: Bodies, poses: PoseBatch
+    ) -> tuple[Bodies, PoseBatch]:
+        """Where displacements and forces agree, from ``bodies`` in their ``poses``, which are shifted.
+
+        ``drawn`` are the bodies without the effect. A leg with play that is pulled when it is short and
+        pushed when it is long swings about the place between, where nothing pulls it.
+        """
+        share, before = np.ones_like(drawn.lengths), np.zeros_like(drawn.lengths)
+        joints = drawn.sliders[..., 0] - self.truth["S"][:, 0]
+        for sweep in range(1, MOST_SWEEPS + 1):
+            shift = self.effect.shift(stops, Posture(joints, bodies, poses))
+            missing = drawn.lengths + shift.lengths - bodies.lengths
+            if sweep > SWEEPS and np.abs(missing).max() < BALANCED_MM:
+                break
+            share, before = np.where(missing * before < 0.0, 0.5 * share, share), missing
             changed = Bodies(
                 drawn.sliders + shift.sliders,
                 drawn.platform + shift.platform,
-                drawn.lengths + shift.lengths,
+                bodies.lengths + share * missing,
             )
             poses, bodies = _settled(bodies, changed, poses), changed
-        return shown, poses
+        return bodies, poses
 
     def _gauges(self, stops: Stops, touched: Array) -> Array:
         """What the gauges show (n, 3), mm, along the axes of the controller's base."""

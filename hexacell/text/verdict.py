@@ -4,12 +4,14 @@ from collections.abc import Iterator, Sequence
 
 from hexacell.checks.change_alarm import ChangeAlarm
 from hexacell.checks.check_result import CheckResult
-from hexacell.lengths import from_to, unit_of
+from hexacell.kinematics.pose import Pose
+from hexacell.lengths import from_to, shown, unit_of
 from hexacell.results.result import ExpectedImprovement, LengthResult
 from hexacell.results.written_geometry import TaskDisplacement
-from hexacell.text.layout import change_with_sigma
+from hexacell.text.layout import change_with_sigma, counted, wrapped
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy
+from hexacell.verdict.either_side import EitherSide
 from hexacell.verdict.length_check import LengthStatement
 from hexacell.verdict.verification import Verification, scale_words
 
@@ -64,9 +66,25 @@ def _error_lines(accuracy: VerifiedAccuracy | None) -> Iterator[str]:
     if (geometry := accuracy.of_geometry) is not None:
         size = _size(geometry.position, "mm")
         yield f"  of that by the geometry: {size}: {geometry.verdict}; the rest is scatter"
+    if accuracy.either_side:
+        yield wrapped(f"  {_either_side(accuracy.either_side)}", indent=2)
     guard_bands = [error.guard_band for _, _, error in accuracy.errors if error.guard_band]
     if guard_bands:
         yield f"  a pass and a fail keep {guard_bands[0]} from the limit"
+
+
+def _either_side(places: Sequence[EitherSide]) -> str:
+    """At which pose that matters most, and what helps."""
+    worst, *_ = places
+    more = len({one.pose for one in places}) - 1
+    others = f" So at {counted(more, 'other task pose')}." if more else ""
+    legs = "leg" if len(worst.legs) == 1 else "legs"
+    return (
+        f"at the task pose {Pose(*worst.pose)} the weight hardly loads {legs} "
+        f"{', '.join(map(str, worst.legs))}: on the other side of the play the ball is "
+        f"{shown(worst.apart_mm)} away. No controller corrects that: load what hardly is, take up the "
+        f"play, or change the pose.{others}"
+    )
 
 
 def check_text(found: CheckResult) -> str:

@@ -195,8 +195,7 @@ def _at_every_stop(term: ModelTerm, on_either_side: ErrorsOfSizes, sizes: Array)
     unit, at_work = JointUnit(term.unit).thousandth, Occurrence.STOPS_AT_WORK
 
     def columns(at: Placement) -> Array:
-        errors = on_either_side(at, np.zeros_like(at.joints), sizes) / size
-        return np.asarray(at.by_constraints * errors[:, None, :])
+        return np.asarray(at.by_constraints @ on_either_side(at, np.zeros_like(at.joints), sizes) / size)
 
     return Effect(f"{term.name} on either side", size, unit, at_work, columns, source="identified")
 

@@ -22,6 +22,7 @@ from hexacell.kinematics.parameters import JointUnit
 from hexacell.lengths import ShownUnit, unit_of
 from hexacell.results.result import LengthResult
 from hexacell.uncertainty.statement import LargestError, TaskErrors
+from hexacell.verdict.either_side import EitherSide
 
 if TYPE_CHECKING:
     from hexacell.campaign.task_accuracy import Task
@@ -147,6 +148,7 @@ class VerifiedAccuracy(Frozen):
         worst: the pose with the largest position error, in the controller's frames.
         scale_of: what says how long a millimetre is: the encoders, or the drawing where these read angles.
         direction: in which every joint arrives at the stops that it holds for, 1 or -1; 0 for any.
+        either_side: task poses at which legs may lie on either side of their play, the worst first.
     """
 
     position: JudgedError
@@ -159,6 +161,7 @@ class VerifiedAccuracy(Frozen):
     length: LengthResult | None = None
     scale_of: Literal["encoders", "drawing"] = "encoders"
     direction: Literal[-1, 0, 1] = 0
+    either_side: tuple[EitherSide, ...] = ()
 
     @classmethod
     def of(
@@ -171,6 +174,7 @@ class VerifiedAccuracy(Frozen):
         of_geometry: TaskErrors | None = None,
         alone: TaskErrors | None = None,
         length: LengthResult | None = None,
+        either_side: tuple[EitherSide, ...] = (),
     ) -> VerifiedAccuracy:
         """The decision on errors at the poses of a ``task`` that the ``robot`` reaches."""
         joint_unit, limits = robot.mechanism.words.joint_unit, settings.acceptance
@@ -186,6 +190,7 @@ class VerifiedAccuracy(Frozen):
             length=length,
             scale_of="encoders" if joint_unit is JointUnit.MM else "drawing",
             direction=settings.motion.sign,
+            either_side=either_side,
         )
 
     @property

@@ -31,6 +31,7 @@ from hexacell.results.result import IdentificationResult, LengthResult
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.length_records import JudgedGeometry
 from hexacell.verdict.decision import Verdict, VerifiedAccuracy, worst_verdict
+from hexacell.verdict.either_side import places_on_either_side
 from hexacell.verdict.length_check import LengthMeasurements, LengthStatement, length_check, length_result
 from hexacell.verdict.model_evidence import (
     ZEROS_DOUBTED,
@@ -205,7 +206,14 @@ def verified_accuracy(
     of_geometry = budget.errors_of(difference, of_geometry=True) if budget.scatters else None
     alone = errors_of_geometry_alone(settings, robot, updated)
     return VerifiedAccuracy.of(
-        errors, settings, robot, task, of_geometry=of_geometry, alone=alone, length=length
+        errors,
+        settings,
+        robot,
+        task,
+        of_geometry=of_geometry,
+        alone=alone,
+        length=length,
+        either_side=places_on_either_side(robot, belief, task),
     )
 
 

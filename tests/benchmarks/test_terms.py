@@ -108,7 +108,7 @@ def is_loaded(robot: Robot, found: Identification, poses: PoseBatch) -> Array:
         for term in terms.terms
         if term.on_either_side is not None
     ]
-    return ~np.any(either, axis=(0, 2)) if either else np.ones(len(poses), dtype=bool)
+    return ~np.any(either, axis=(0, 2, 3)) if either else np.ones(len(poses), dtype=bool)
 
 
 def carried_out(machine: Machine, number: int) -> Outcome:

@@ -8,7 +8,7 @@ import numpy as np
 
 from hexacell.identification.placement import Placement
 from hexacell.identification.terms.term import ModelTerm
-from hexacell.kinematics.parameters import JointUnit
+from hexacell.kinematics.parameters import LEGS, JointUnit
 from hexacell.kinematics.rotations import Array
 
 
@@ -24,4 +24,5 @@ def _lagging(placement: Placement, directions: Array) -> Array:
 
 
 def _where_unknown(placement: Placement, directions: Array, sizes: Array) -> Array:
-    return np.where(directions == 0.0, 0.5 * placement.derivatives.joints * sizes, 0.0)
+    lagging = np.where(directions == 0.0, 0.5 * placement.derivatives.joints * sizes, 0.0)
+    return np.asarray(lagging[..., None] * np.eye(LEGS))

@@ -4,7 +4,7 @@ import numpy as np
 
 from hexacell.identification.placement import Placement, leg_forces
 from hexacell.identification.terms.compliance import compliance
-from hexacell.identification.terms.play import play
+from hexacell.identification.terms.play import HARDLY_LOADED, play
 from hexacell.kinematics.corrections import Corrections
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, Mechanism
@@ -13,10 +13,6 @@ from hexacell.kinematics.rotations import Array
 
 NOT_KNOWN = 0.2
 """Share of what a controller adds to its joints that may differ: it computes forces in its own way."""
-
-BETWEEN = 0.01
-"""Force of a leg, by a weight of one newton, with less of which a controller whose joints must not jump may
-have the leg anywhere between both ends of its play."""
 
 
 def commanded_joints(
@@ -38,13 +34,14 @@ def _added(at: Placement, corrections: Corrections) -> tuple[Array, Array]:
     """What play and compliance add to the joint variables (n, 6), in their unit, to first order.
 
     Half a backlash is added beside the joint variables, which do not show it. Beside that comes the whole
-    play of legs that hardly anything pulls or pushes.
+    play of legs that hardly anything pulls or pushes: a controller whose joints must not jump may have them
+    anywhere between.
     """
     direction, centre = np.array(corrections.weight_direction), corrections.weight_centre_mm
     acts = direction, None if centre is None else np.array(centre)
     unknown = np.zeros_like(at.joints)
     errors = play(1.0, *acts).leg_errors(at, unknown) * corrections.play_mm
     yielding = compliance(1.0, corrections.weight_n, *acts).leg_errors(at, unknown)
-    is_between = np.abs(leg_forces(at, *acts)) < BETWEEN
+    is_between = np.abs(leg_forces(at, *acts)) < HARDLY_LOADED
     unseated = np.abs(at.as_joints(is_between * np.array(corrections.play_mm)))
     return -at.as_joints(errors + yielding * corrections.compliance_um_n), unseated

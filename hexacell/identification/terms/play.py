@@ -1,14 +1,16 @@
 """Play: the joints of a leg have clearance, and the leg is longer when it is pulled than when it is pushed.
 
 The side on which a joint lies follows from the sign of the force, that of the platform's weight; how heavy
-the platform is does not matter. A leg that is hardly pulled or pushed may lie on either side: each side may
-bring the platform to where the force keeps it there.
+the platform is does not matter. Legs that are hardly loaded may lie on either side: the platform has
+another place, at which they are pushed that were pulled, and keeps the place to which it came.
 """
 
 from dataclasses import replace
 from functools import partial
+from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hexacell.identification.placement import Placement, leg_forces
 from hexacell.identification.terms.term import ModelTerm
@@ -18,6 +20,15 @@ from hexacell.kinematics.rotations import Array
 
 WRONG_SIDE = float(np.sqrt(0.5))
 """Root mean square of an error that is as likely none as all of the play."""
+
+HARDLY_LOADED = 0.01
+"""Force of a leg, by a weight of one newton, of which nobody knows the sign."""
+
+Acts = tuple[Array, Array | None]
+"""Direction and centre of a weight."""
+
+EVERY = np.array(list(product((-1.0, 1.0), repeat=LEGS)))
+"""All sides on which six legs may lie (64, 6)."""
 
 
 def play(size_mm: float, direction: Array, centre_mm: Array | None = None) -> ModelTerm:
@@ -37,11 +48,44 @@ def _on_one_side(
 def _on_either_side(
     direction: Array, centre_mm: Array | None, placement: Placement, _directions: Array, sizes_mm: Array
 ) -> Array:
-    pulls = leg_forces(placement, direction, centre_mm) > 0.0
-    either = np.zeros_like(pulls)
+    """The other places that the platform may have, each one cause (n, 6, k)."""
+    acts = direction, centre_mm
+    forces = leg_forces(placement, *acts)
+    sides, may = _sides(forces), (np.abs(forces) < HARDLY_LOADED).any(axis=1)
     for leg in range(LEGS):
-        for longer_mm in (-sizes_mm[leg], sizes_mm[leg]):
-            moved = apply_twist(placement.poses, longer_mm * placement.by_constraints[:, :, leg])
-            there = leg_forces(replace(placement, poses=moved), direction, centre_mm)
-            either[:, leg] |= (there[:, leg] > 0.0) != pulls[:, leg]
-    return np.asarray(WRONG_SIDE * either * sizes_mm)
+        alone = sides * np.where(np.arange(LEGS) == leg, -1.0, 1.0)
+        may |= (_sides_at(placement, sides, alone, sizes_mm, acts) != sides).any(axis=1)
+    places = {
+        row: _other_places(_rows(placement, np.full(len(EVERY), row)), forces[row], sizes_mm, acts)
+        for row in np.flatnonzero(may).tolist()
+    }
+    errors = np.zeros((*forces.shape, max(map(len, places.values()), default=0)))
+    for row, others in places.items():
+        errors[row, :, : len(others)] = (sides[row] - others).T
+    return np.asarray(0.5 * WRONG_SIDE * errors * sizes_mm[:, None])
+
+
+def _other_places(at: Placement, forces: Array, sizes_mm: Array, acts: Acts) -> Array:
+    """The sides of the legs (k, 6) where they balance too, and of each leg whose side is not known."""
+    sides = np.tile(_sides(forces), (len(EVERY), 1))
+    is_balanced = (_sides_at(at, sides, EVERY, sizes_mm, acts) == EVERY).all(axis=1)
+    unsure = np.abs(forces) < HARDLY_LOADED
+    differ = sides != EVERY
+    is_other = is_balanced | (differ @ unsure & (differ.sum(axis=1) == 1))
+    return np.asarray(EVERY[is_other & differ.any(axis=1)])
+
+
+def _sides_at(at: Placement, sides: Array, others: Array, sizes_mm: Array, acts: Acts) -> Array:
+    """On which sides the legs would lie if they lay on ``others``, and not as now."""
+    twists = 0.5 * at.by_constraints @ ((sides - others) * sizes_mm)[..., None]
+    moved = replace(at, poses=apply_twist(at.poses, twists[..., 0]))
+    return _sides(leg_forces(moved, *acts))
+
+
+def _rows(placement: Placement, rows: NDArray[np.intp]) -> Placement:
+    return replace(placement, poses=placement.poses[rows], joints=placement.joints[rows])
+
+
+def _sides(forces: Array) -> Array:
+    """1 of a leg that is pulled, -1 of one that is pushed."""
+    return np.where(forces > 0.0, 1.0, -1.0)

@@ -84,8 +84,8 @@ def _unknown_places(terms: tuple[ModelTerm, ...], records: RecordPlacement, valu
     for row, term in enumerate(terms):
         if term.on_either_side is not None:
             size = term.mean if values is None else values[row * LEGS : (row + 1) * LEGS]
-            errors = term.on_either_side(records, records.directions, size)
-            variance = variance + records.as_joints(errors) ** 2
+            squares = np.sum(term.on_either_side(records, records.directions, size) ** 2, axis=-1)
+            variance = variance + records.as_joints(np.sqrt(squares)) ** 2
     return variance
 
 

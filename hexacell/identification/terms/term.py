@@ -23,7 +23,7 @@ LegErrors = Callable[[Placement, Array], Array]
 joints arrived from some directions (n, 6)."""
 
 ErrorsOfSizes = Callable[[Placement, Array, Array], Array]
-"""Likewise by coefficients of some sizes (6,)."""
+"""Likewise (n, 6, k) by each of k independent causes, for coefficients of some sizes (6,)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

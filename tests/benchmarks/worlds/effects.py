@@ -47,6 +47,11 @@ class Stops:
     def __len__(self) -> int:
         return len(self.points)
 
+    def __getitem__(self, rows: NDArray[np.intp]) -> Stops:
+        """Some of them, as if each came from itself: what is left to ask of them has been computed."""
+        parts = self.points[rows], self.hours[rows], self.joints[rows], np.arange(len(rows))
+        return Stops(*parts, self.seed, self.at_work)
+
     @property
     def directions(self) -> Array:
         """Whether each slider came from below, 1, or from above, -1 (n, 6)."""

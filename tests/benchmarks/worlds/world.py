@@ -21,7 +21,7 @@ from tests.benchmarks.worlds.closure import STAGES, Bodies, CannotCloseError, cl
 from tests.benchmarks.worlds.effects import Effect, Posture, Stops
 
 SWEEPS, MOST_SWEEPS = 4, 60
-"""Displacements that depend on the pose, and the pose that depends on them, in turn, at least and at most."""
+"""Displacements by the pose, and the pose by them, in turn, at least and at most."""
 
 BALANCED_MM = 1e-4
 """By how much legs are longer or shorter than their forces have them, in the end."""
@@ -155,11 +155,7 @@ class World:
         stops = self._stops(_one_point(every), written, hour)
         order = np.random.default_rng([self.seed, 2]).permutation(len(every))
         stops = replace(
-            stops,
-            hours=np.full(len(every), hour),
-            previous=order,
-            seed=(self.seed, 3),
-            at_work=True,
+            stops, hours=np.full(len(every), hour), previous=order, seed=(self.seed, 3), at_work=True
         )
         reached = self._reached(self._corrected(stops, every), written, every)[1]
         return [reached[slice(first, first + len(poses))] for first in range(0, len(every), len(poses))]
@@ -188,21 +184,39 @@ class World:
         return shown, self._balanced(stops, drawn, drawn, poses)[1]
 
     def _arrived(self, stops: Stops, drawn: Bodies, poses: PoseBatch) -> PoseBatch:
-        """The poses of a machine that comes from other stops, and meanwhile keeps its balance."""
+        """The poses of a machine that comes from other stops, and meanwhile keeps its balance.
+
+        Where no straight way leads from one to the other, as if it were put there.
+        """
         bodies, balanced = self._balanced(stops, drawn, drawn, poses)
-        came = stops.previous
-        bodies, balanced, here = bodies[came], balanced[came], drawn[came]
-        left = here
-        for stage in range(1, ON_THE_WAY + 1):
-            there = left.blend(drawn, stage / ON_THE_WAY)
-            moved = bodies.moved_with(here, there)
-            balanced = follow(bodies, moved, balanced, STAGES_ON_THE_WAY)
-            bodies, balanced = self._balanced(stops, there, moved, balanced)
-            here = there
+        came, every = stops.previous, np.arange(len(stops))
+        try:
+            return self._on_the_way(stops, (drawn[came], drawn), bodies[came], balanced[came])
+        except CannotCloseError:
+            pass
+        for row in every[:, None]:
+            try:
+                left = drawn[came[row]], drawn[row]
+                there = self._on_the_way(stops[row], left, bodies[came[row]], balanced[came[row]])
+            except CannotCloseError:
+                continue
+            balanced = balanced.with_rows(row, there)
         return balanced
 
+    def _on_the_way(
+        self, stops: Stops, way: tuple[Bodies, Bodies], bodies: Bodies, poses: PoseBatch
+    ) -> PoseBatch:
+        here, (left, end) = way[0], way
+        for stage in range(1, ON_THE_WAY + 1):
+            there = left.blend(end, stage / ON_THE_WAY)
+            moved = bodies.moved_with(here, there)
+            poses = follow(bodies, moved, poses, STAGES_ON_THE_WAY)
+            bodies, poses = self._balanced(stops, there, moved, poses, least=1)
+            here = there
+        return poses
+
     def _balanced(
-        self, stops: Stops, drawn: Bodies, bodies: Bodies, poses: PoseBatch
+        self, stops: Stops, drawn: Bodies, bodies: Bodies, poses: PoseBatch, least: int = SWEEPS
     ) -> tuple[Bodies, PoseBatch]:
         """Where displacements and forces agree, from ``bodies`` in their ``poses``, which are shifted.
 
@@ -214,7 +228,7 @@ class World:
         for sweep in range(1, MOST_SWEEPS + 1):
             shift = self.effect.shift(stops, Posture(joints, bodies, poses))
             missing = drawn.lengths + shift.lengths - bodies.lengths
-            if sweep > SWEEPS and np.abs(missing).max() < BALANCED_MM:
+            if sweep > least and np.abs(missing).max() < BALANCED_MM:
                 break
             share, before = np.where(missing * before < 0.0, 0.5 * share, share), missing
             changed = Bodies(

@@ -286,8 +286,9 @@ def test_backlash_as_linuxcnc_takes_it(joint: str, added: str, problem: str, bac
     assert found.corrections.backlash == pytest.approx((0.0, backlash, 0.0, 0.0, 0.0, 0.0))
     assert found.holds == (frozenset() if "COMP_FILE" in added else {CorrectionKind.BACKLASH})
     if found.holds:
-        new = INI.rewrite(text, found.values, LAGGING)
-        assert INI.read(new, None).corrections.backlash == pytest.approx(LAGGING.backlash, abs=1e-6)
+        wanted = replace(LAGGING, backlash=(0.0, 0.03, 0.102, 0.0, -0.004, 0.0))
+        new = INI.rewrite(text, found.values, wanted)
+        assert INI.read(new, None).corrections.backlash == pytest.approx(wanted.backlash, abs=1e-6)
 
 
 def test_backlash_in_two_files_is_refused(tmp_path: Path) -> None:

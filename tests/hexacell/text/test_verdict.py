@@ -18,6 +18,7 @@ from hexacell.text.verdict import (
     verification_text,
 )
 from hexacell.verdict.decision import GeometryErrors, JudgedError, Verdict, VerifiedAccuracy
+from hexacell.verdict.either_side import EitherSide
 from hexacell.verdict.model_evidence import ModelTest
 from hexacell.verdict.verification import Verification
 from procedures.run.state import RunState
@@ -83,17 +84,23 @@ def test_no_line_of_a_verdict_is_wider_than_a_terminal(value, expanded, limit, v
     position = JudgedError(value=value, expanded=expanded, limit=limit, verdict=verdict)
     errors = accuracy().model_copy(update={"position": position, "poses": 1024, "task_named": False})
     geometry = GeometryErrors(position=position, orientation=errors.orientation)
+    places = tuple(
+        EitherSide(pose=(x, -50.0, 450.0, 0.0, 0.0, -20.0), legs=(2, 5), apart_mm=value) for x in (0.0, 1.0)
+    )
     failed = ModelTest(name="test", passed=False, sentence="Much " * words)
     verified = Verification(
         verdict=verdict,
         tests=(failed,),
-        accuracy=errors.model_copy(update={"of_geometry": geometry}),
+        accuracy=errors.model_copy(update={"of_geometry": geometry, "either_side": places}),
         before_mm=value,
         after_mm=expanded,
     )
     told = event_text(events.ResultValidated(verdict=verdict, line="", verification=verified), RunState())
     assert told is not None
     assert max(map(len, told.splitlines())) <= COLUMNS
+    named = "X0.000 Y-50.000 Z450.000 A0.000 B0.000 C-20.000 the weight hardly loads legs 2, 5"
+    assert named in " ".join(told.split())
+    assert "So at 1 other task pose." in " ".join(told.split())
 
 
 @pytest.mark.parametrize(

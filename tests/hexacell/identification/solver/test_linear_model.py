@@ -5,7 +5,8 @@ from functools import partial
 
 import numpy as np
 import pytest
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, null_space
+from scipy.stats import multivariate_normal
 
 from hexacell.identification.diagnostics.model_tests import leave_one_point_out, prediction_test
 from hexacell.identification.estimator import identify
@@ -79,6 +80,27 @@ def test_a_point_is_predicted_under_the_full_covariance(found):
     assert tested.chi2 == pytest.approx(dense, rel=1e-5)
     assert tested.expected == 30
     assert leave_one_point_out(found)[2].test == tested
+
+
+def test_evidence_is_the_density_of_all_that_the_points_zeros_leave(found):
+    """Of records whose noise is larger by a factor, with and without causes that they share."""
+    problem, scale, rows = found.problem, 1.7, np.ones(found.records, dtype=bool)
+    shared = 0.03 * np.random.default_rng(3).standard_normal((found.records, 3, 4))
+    common = systematic_errors(problem, found.prediction).common.reshape(3 * found.records, -1)
+    jacobian = found.prediction.jacobian.reshape(len(common), -1)
+    zeros = np.kron(problem.labels[:, :1] == np.unique(problem.labels[:, 0]), np.eye(3))
+    contrasts = null_space(zeros.T).T
+    noise = scale * (covariance(found, rows) - common @ common.T) + common @ common.T
+    before = noise + jacobian @ problem.prior.covariance @ jacobian.T
+    off = found.prediction.residuals.ravel() + jacobian @ (problem.prior.free - found.free)
+
+    def density(causes):
+        spread = before + causes.reshape(len(common), -1) @ causes.reshape(len(common), -1).T
+        return multivariate_normal(cov=contrasts @ spread @ contrasts.T).logpdf(contrasts @ off)
+
+    linear = LinearCosts.at(problem, found.prediction)
+    gain = linear.with_causes(shared).log_evidence(rows, scale) - linear.log_evidence(rows, scale)
+    assert gain == pytest.approx(density(shared) - density(np.zeros_like(shared)), rel=1e-5)
 
 
 def test_without_systematic_errors_it_is_the_test_of_the_noise(found):

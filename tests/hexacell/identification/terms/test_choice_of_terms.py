@@ -202,16 +202,3 @@ def test_coefficients_that_no_machine_has_are_named() -> None:
     less = replace(upwards, size=1e-3 * upwards.size)
     [sentence] = impossible_terms((less,), results)
     assert re.search(r"\(leg \d(, \d){2,5}\), far beyond what \[model\] states", sentence)
-
-
-def test_which_legs_may_lie_on_either_side_follows_from_the_size_of_their_play() -> None:
-    """Not from what is stated of it: twice as large a play lets more legs be anywhere."""
-    found = identified("play")
-    [term] = found.terms.terms if found.terms else ()
-    assert term.on_either_side is not None
-    records = found.placement
-    small, large = (
-        np.count_nonzero(term.on_either_side(records, records.directions, np.full(6, mm)))
-        for mm in (0.02, 0.5)
-    )
-    assert 0 <= small < large

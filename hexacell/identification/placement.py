@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -79,20 +79,34 @@ class RecordPlacement(Placement):
     directions: Array
 
 
-def leg_forces(placement: Placement, direction: Array, centre_mm: Array | None = None) -> Array:
-    """Forces (n, 6) of the legs, N, by a weight of one newton on the platform; tension is positive.
+@dataclass(frozen=True, slots=True, eq=False)
+class Weight:
+    """How a weight acts on the platform.
 
-    Args:
-        placement: n poses.
-        direction: of the weight (3,), a unit vector in the convention's base frame.
+    Attributes:
+        direction: (3,), a unit vector in the convention's base frame.
         centre_mm: where it acts (3,), in its platform frame; None: in the middle of the platform's joints.
+        beside_mm: (3,) how far from there.
     """
+
+    direction: Array
+    centre_mm: Array | None = None
+    beside_mm: Array = field(default_factory=lambda: np.zeros(3))
+
+    def moved(self, beside_mm: Array) -> Weight:
+        """The same weight elsewhere, by (3,) mm in the platform frame."""
+        return replace(self, beside_mm=self.beside_mm + beside_mm)
+
+
+def leg_forces(placement: Placement, weight: Weight) -> Array:
+    """Forces (n, 6) of the legs, N, by a weight of one newton on the platform; tension is positive."""
     poses = placement.poses
-    if centre_mm is None:
+    direction, arms = weight.direction, poses.rotations @ weight.beside_mm
+    if weight.centre_mm is None:
         legs = placement.mechanism.legs(placement.geometry, poses, placement.joints)
-        arms = legs.platform_joints.mean(axis=1) - poses.positions
+        arms = arms + legs.platform_joints.mean(axis=1) - poses.positions
     else:
-        arms = poses.rotations @ centre_mm
+        arms = arms + poses.rotations @ weight.centre_mm
     wrench = np.concatenate([np.broadcast_to(direction, arms.shape), np.cross(arms, direction)], axis=-1)
     # Virtual work: J^T t = w, with -J^-1 at hand.
     return np.asarray(-np.einsum("nji,nj->ni", placement.by_constraints, wrench))

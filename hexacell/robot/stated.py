@@ -17,6 +17,7 @@ from hexacell.cell.uncertainty import (
 )
 from hexacell.config.interface import ControllerGeometry, ControllerLimits
 from hexacell.errors import ReachError
+from hexacell.identification.placement import Weight
 from hexacell.identification.problem.prior import Noise
 from hexacell.identification.terms.backlash import backlash
 from hexacell.identification.terms.compliance import compliance
@@ -215,7 +216,7 @@ def stated_effects(settings: CellSettings, measured_range_k: float | None = None
     if measured_range_k is not None:
         measuring = replace(measuring, size=measured_range_k, source="thermometers")
     scales = gauge_scales(1e3 * settings.noise.gauge_scale, is_estimated=True)
-    yields, (direction, centre) = stated.leg_compliance_um_n, _weight_acts(settings)
+    yields = stated.leg_compliance_um_n
     return (
         *effects,
         replace(scales, source="noise.gauge_scale"),
@@ -224,25 +225,25 @@ def stated_effects(settings: CellSettings, measured_range_k: float | None = None
         of("temperature_at_work_k", partial(temperature_at_work, um_per_m_k=expansion)),
         measuring,
         of("load_n", partial(load_at_work, um_per_n=yields)),
-        of("own_weight_n", partial(own_weight, um_per_n=yields, direction=direction, centre_mm=centre)),
+        of("own_weight_n", partial(own_weight, um_per_n=yields, weight=_stated_weight(settings))),
     )
 
 
-def _weight_acts(settings: CellSettings) -> tuple[Array, Array | None]:
-    """Direction (3,) and centre (3,) of the weight in the convention; they are stated in the drawing's."""
+def _stated_weight(settings: CellSettings) -> Weight:
+    """How the weight acts in the convention's frames; it is stated in the drawing's."""
     stated, frames = settings.uncertainty, settings.mechanism.normalize_frames(settings.drawing)[1]
     centre = stated.own_weight_centre_mm
     direction = frames.base @ _unit(stated.own_weight_direction)
-    return direction, None if centre is None else frames.platform @ np.array(centre)
+    return Weight(direction, None if centre is None else frames.platform @ np.array(centre))
 
 
 def stated_terms(settings: CellSettings) -> tuple[ModelTerm, ...]:
     """The terms beside the geometry that a cell's records are searched for."""
     stated, newton = settings.model, settings.uncertainty.own_weight_n
-    acts, unit = _weight_acts(settings), settings.mechanism.words.joint_unit
+    weight, unit = _stated_weight(settings), settings.mechanism.words.joint_unit
     terms = {
         "backlash": backlash(stated.backlash, unit),
-        "play": play(stated.play_mm, *acts),
-        "compliance": compliance(stated.compliance_um_n, newton, *acts),
+        "play": play(stated.play_mm, weight),
+        "compliance": compliance(stated.compliance_um_n, newton, weight),
     }
     return tuple(terms[name] for name in stated.terms if newton or name != "compliance")

@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from hexacell.identification.placement import Placement, RecordPlacement, leg_forces
+from hexacell.identification.placement import Placement, RecordPlacement, Weight, leg_forces
 from hexacell.kinematics.parameters import LEGS, JointUnit, MachinePart
 from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effects import UM, Effect, Occurrence
@@ -155,18 +155,17 @@ LEGS_DIFFER = 0.3
 """Share by which the compliance of a leg, one standard deviation, differs from that of all legs."""
 
 
-def own_weight(newton: float, um_per_n: float, direction: Array, centre_mm: Array | None = None) -> Effect:
+def own_weight(newton: float, um_per_n: float, weight: Weight) -> Effect:
     """Each leg yields by its part of a weight on the platform, all nearly alike.
 
     Args:
-        newton: the weight.
+        newton: how heavy it is.
         um_per_n: compliance of a leg with its joints, one standard deviation.
-        direction: of the weight (3,), a unit vector in the convention's base frame.
-        centre_mm: where it acts (3,), in its platform frame; None: in the middle of the platform's joints.
+            weight: how it acts.
     """
 
     def yielding(placement: Placement) -> Array:
-        forces = leg_forces(placement, direction, centre_mm)
+        forces = leg_forces(placement, weight)
         each = UM * um_per_n * placement.by_constraints * forces[:, None, :]
         return np.concatenate([each.sum(axis=-1, keepdims=True), LEGS_DIFFER * each], axis=-1)
 

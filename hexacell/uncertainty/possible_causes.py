@@ -28,7 +28,7 @@ from hexacell.identification.data_faults.hypotheses import (
     rank_hypotheses,
 )
 from hexacell.identification.data_faults.stepwise_selection import SHOWN_DECREASE
-from hexacell.identification.placement import leg_forces
+from hexacell.identification.placement import Weight, leg_forces
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.measurement_model import NuisanceElimination
 from hexacell.identification.solver.result import Identification
@@ -61,6 +61,13 @@ WAVELENGTHS_MM = (600.0, 1500.0)
 """Waves of the rails that are longer than the travel of a slider at one point."""
 
 
+AROUND = np.arange(8) * np.pi / 4
+BESIDE = np.concatenate(
+    [share * np.stack([np.cos(AROUND), np.sin(AROUND), 0.0 * AROUND], axis=-1) for share in (0.1, 0.3, 0.6)]
+)
+"""Where a weight may act instead, (k, 3) by the radius of the platform."""
+
+
 @dataclass(frozen=True, slots=True)
 class PossibleCause:
     """A cause that would explain a share (0 to 1) of the excess of the residuals, named for people."""
@@ -85,7 +92,7 @@ def _of_the_machine(test: ExcessTest) -> Iterator[PossibleCause]:
         "errors of the encoders": [*test.by_effects(of_encoders), *test.by_encoders()],
         "guides that are not straight or parallel": test.by_effects(rail_directions(1.0), *waves),
         "legs that yield under the load": test.by_effects(
-            load_at_work(1.0, 1.0), own_weight(1.0, 1.0, test.down)
+            load_at_work(1.0, 1.0), own_weight(1.0, 1.0, Weight(test.down))
         ),
         "clearance in the legs that changes sides with the load": test.by_clearance(),
         "a temperature that changed while measuring": test.by_expansion(),
@@ -97,6 +104,30 @@ def _of_the_machine(test: ExcessTest) -> Iterator[PossibleCause]:
     for name, parts in columns.items():
         yield PossibleCause(name, test.share_of_columns(parts))
     yield from _lost_place(test)
+    yield from _weight_elsewhere(test)
+
+
+def _weight_elsewhere(test: ExcessTest) -> Iterator[PossibleCause]:
+    """The most likely place of a weight under which a term acts, if that is not where it is stated."""
+    problem, placement = test.found.problem, test.found.placement
+    radius = float(problem.mechanism.platform_radius(test.found.geometry))
+    significant = chi_square_limit(2, FALSE_STEPS / (len(BESIDE) * max(1, len(problem.offered))))
+    best, likely = 0.0, None
+    for term in problem.offered:
+        # Of a term that is linear in the forces another place does the same as the opposite one.
+        if term.weight is None or term.of_weight is None or term.on_either_side is None:
+            continue
+        stated, unknowns = test.gain(term.pose_errors(placement, problem.directions)[:, :3])
+        for beside in radius * BESIDE:
+            moved = term.of_weight(term.weight.moved(beside))
+            gain, _ = test.gain(moved.pose_errors(placement, problem.directions)[:, :3])
+            if gain - stated > max(best, significant * max(1.0, test.found.noise_test.ratio) ** 2):
+                best, likely = gain - stated, (beside, test.share_of_gain(gain, unknowns + 2))
+    if likely is not None:
+        (x, y, _), share = likely
+        yield PossibleCause(
+            f"a weight that acts some {x:+.0f} mm in x, {y:+.0f} mm in y from own_weight_centre_mm", share
+        )
 
 
 def _lost_place(test: ExcessTest) -> Iterator[PossibleCause]:
@@ -147,7 +178,7 @@ class ExcessTest:
 
     def share_of_columns(self, parts: Iterable[Array]) -> float:
         """The share (0 to 1) of the excess that columns (n, 3, k) explain together."""
-        return self.share_of_gain(*self._gain(np.concatenate([*parts], axis=-1)))
+        return self.share_of_gain(*self.gain(np.concatenate([*parts], axis=-1)))
 
     def share_of_gain(self, gain: float, unknowns: int) -> float:
         """The share (0 to 1) that a decrease of the chi-square by some unknowns explains."""
@@ -170,7 +201,7 @@ class ExcessTest:
     def by_clearance(self) -> list[Array]:
         """Legs that are longer or shorter as the platform's weight pulls or pushes them."""
         placement = self.found.placement
-        sides = np.sign(leg_forces(placement, self.down))
+        sides = np.sign(leg_forces(placement, Weight(self.down)))
         return [(placement.by_constraints * sides[:, None, :])[:, :3]]
 
     def by_encoders(self) -> list[Array]:
@@ -220,7 +251,7 @@ class ExcessTest:
         best = int(np.argmax(gains))
         return float(gains[best]), best
 
-    def _gain(self, columns: Array) -> tuple[float, int]:
+    def gain(self, columns: Array) -> tuple[float, int]:
         """The decrease of the chi-square by all columns, and by how many unknowns."""
         by_causes, remaining, residuals = self._beside_parameters(columns)
         values, axes = np.linalg.eigh(by_causes.T @ remaining)

@@ -12,6 +12,7 @@ import pytest
 
 from hexacell.cell.uncertainty import Grade
 from hexacell.identification.estimator import identify
+from hexacell.identification.placement import Weight
 from hexacell.uncertainty.effect_kinds import own_weight
 from hexacell.verdict.decision import Verdict
 from tests.benchmarks.figures import NEVER, at_most, between, least_by_chance, most_by_chance
@@ -97,7 +98,7 @@ def is_doubtful(number: int, um_per_n: float, *, stated: bool) -> bool:
     noise = replace(own.robot.noise, alignment=0.0, gauge_scale=0.0, encoder=QUIET_MM, gauge_mm=QUIET_MM)
     effects = budgets.machine("ideal")
     if stated:
-        effects = (*effects, own_weight(100.0, um_per_n, own.robot.frames.base @ DOWN))
+        effects = (*effects, own_weight(100.0, um_per_n, Weight(own.robot.frames.base @ DOWN)))
     robot = replace(own.robot, noise=noise, effects=effects)
     records = replace(world, robot=replace(world.robot, noise=noise)).records(
         own.commands, robot.commanding

@@ -15,7 +15,7 @@ from hexacell.cell.loader import load_cell
 from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import ConfigLayout
 from hexacell.config.linuxcnc_ini import IniText
-from hexacell.identification.placement import Placement, leg_forces
+from hexacell.identification.placement import Placement, Weight, leg_forces
 from hexacell.kinematics.corrections import Corrections
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism
@@ -50,7 +50,7 @@ def loaded_joints(mechanism: Mechanism, controller: ControllerGeometry, poses: P
     joints = mechanism.inverse(geometry, controller.branch, poses)
     direction, centre = np.array(corrections.weight_direction), corrections.weight_centre_mm
     at = Placement(mechanism, geometry, poses, joints)
-    forces = leg_forces(at, direction, None if centre is None else np.array(centre))
+    forces = leg_forces(at, Weight(direction, None if centre is None else np.array(centre)))
     longer = 1e-3 * np.array(corrections.compliance_um_n) * corrections.weight_n * forces
     longer += 0.5 * np.array(corrections.play_mm) * np.clip(forces / SEATED, -1.0, 1.0)
     for row, changes in enumerate(mechanism.parameters.changes("l", longer.T).T):

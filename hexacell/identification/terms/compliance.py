@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from hexacell.identification.placement import Placement, leg_forces
+from hexacell.identification.placement import Placement, Weight, leg_forces
 from hexacell.identification.terms.term import ModelTerm
 from hexacell.kinematics.rotations import Array
 
@@ -12,15 +12,18 @@ UM = 1e-3
 """A micrometre in mm."""
 
 
-def compliance(
-    size_um_n: float, newton: float, direction: Array, centre_mm: Array | None = None
-) -> ModelTerm:
-    """The compliance of each leg, um/N, under a weight; for the others see :func:`.leg_forces`."""
-    yielding = partial(_yielding, newton, direction, centre_mm)
-    return ModelTerm("compliance", "um/N", size_um_n, yielding, takes_up="own weight")
+def compliance(size_um_n: float, newton: float, weight: Weight) -> ModelTerm:
+    """The compliance of each leg, um/N, under a weight of so many newtons."""
+    return ModelTerm(
+        "compliance",
+        "um/N",
+        size_um_n,
+        partial(_yielding, newton, weight),
+        takes_up="own weight",
+        weight=weight,
+        of_weight=partial(compliance, size_um_n, newton),
+    )
 
 
-def _yielding(
-    newton: float, direction: Array, centre_mm: Array | None, placement: Placement, _directions: Array
-) -> Array:
-    return np.asarray(-UM * newton * leg_forces(placement, direction, centre_mm))
+def _yielding(newton: float, weight: Weight, placement: Placement, _directions: Array) -> Array:
+    return np.asarray(-UM * newton * leg_forces(placement, weight))

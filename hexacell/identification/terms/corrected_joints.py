@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hexacell.identification.placement import Placement, leg_forces
+from hexacell.identification.placement import Placement, Weight, leg_forces
 from hexacell.identification.terms.compliance import compliance
 from hexacell.identification.terms.play import HARDLY_LOADED, play
 from hexacell.kinematics.corrections import Corrections
@@ -37,11 +37,11 @@ def _added(at: Placement, corrections: Corrections) -> tuple[Array, Array]:
     play of legs that hardly anything pulls or pushes: a controller whose joints must not jump may have them
     anywhere between.
     """
-    direction, centre = np.array(corrections.weight_direction), corrections.weight_centre_mm
-    acts = direction, None if centre is None else np.array(centre)
+    centre = corrections.weight_centre_mm
+    weight = Weight(np.array(corrections.weight_direction), None if centre is None else np.array(centre))
     unknown = np.zeros_like(at.joints)
-    errors = play(1.0, *acts).leg_errors(at, unknown) * corrections.play_mm
-    yielding = compliance(1.0, corrections.weight_n, *acts).leg_errors(at, unknown)
-    is_between = np.abs(leg_forces(at, *acts)) < HARDLY_LOADED
+    errors = play(1.0, weight).leg_errors(at, unknown) * corrections.play_mm
+    yielding = compliance(1.0, corrections.weight_n, weight).leg_errors(at, unknown)
+    is_between = np.abs(leg_forces(at, weight)) < HARDLY_LOADED
     unseated = np.abs(at.as_joints(is_between * np.array(corrections.play_mm)))
     return -at.as_joints(errors + yielding * corrections.compliance_um_n), unseated

@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from hexacell.identification.placement import Placement, leg_forces
+from hexacell.identification.placement import Placement, Weight, leg_forces
 from hexacell.identification.terms.term import ModelTerm
 from hexacell.kinematics.forward import apply_twist
 from hexacell.kinematics.parameters import LEGS
@@ -24,39 +24,36 @@ WRONG_SIDE = float(np.sqrt(0.5))
 HARDLY_LOADED = 0.01
 """Force of a leg, by a weight of one newton, of which nobody knows the sign."""
 
-Acts = tuple[Array, Array | None]
-"""Direction and centre of a weight."""
-
 EVERY = np.array(list(product((-1.0, 1.0), repeat=LEGS)))
 """All sides on which six legs may lie (64, 6)."""
 
 
-def play(size_mm: float, direction: Array, centre_mm: Array | None = None) -> ModelTerm:
-    """The play of each leg; where and whereto the weight acts as in :func:`.leg_forces`."""
-    acts = direction, centre_mm
+def play(size_mm: float, weight: Weight) -> ModelTerm:
+    """The play of each leg under a weight."""
     return ModelTerm(
-        "play", "mm", size_mm, partial(_on_one_side, *acts), on_either_side=partial(_on_either_side, *acts)
+        "play",
+        "mm",
+        size_mm,
+        partial(_on_one_side, weight),
+        on_either_side=partial(_on_either_side, weight),
+        weight=weight,
+        of_weight=partial(play, size_mm),
     )
 
 
-def _on_one_side(
-    direction: Array, centre_mm: Array | None, placement: Placement, _directions: Array
-) -> Array:
-    return np.asarray(-0.5 * np.sign(leg_forces(placement, direction, centre_mm)))
+def _on_one_side(weight: Weight, placement: Placement, _directions: Array) -> Array:
+    return np.asarray(-0.5 * np.sign(leg_forces(placement, weight)))
 
 
-def _on_either_side(
-    direction: Array, centre_mm: Array | None, placement: Placement, _directions: Array, sizes_mm: Array
-) -> Array:
+def _on_either_side(weight: Weight, placement: Placement, _directions: Array, sizes_mm: Array) -> Array:
     """The other places that the platform may have, each one cause (n, 6, k)."""
-    acts = direction, centre_mm
-    forces = leg_forces(placement, *acts)
+    forces = leg_forces(placement, weight)
     sides, may = _sides(forces), (np.abs(forces) < HARDLY_LOADED).any(axis=1)
     for leg in range(LEGS):
         alone = sides * np.where(np.arange(LEGS) == leg, -1.0, 1.0)
-        may |= (_sides_at(placement, sides, alone, sizes_mm, acts) != sides).any(axis=1)
+        may |= (_sides_at(placement, sides, alone, sizes_mm, weight) != sides).any(axis=1)
     places = {
-        row: _other_places(_rows(placement, np.full(len(EVERY), row)), forces[row], sizes_mm, acts)
+        row: _other_places(_rows(placement, np.full(len(EVERY), row)), forces[row], sizes_mm, weight)
         for row in np.flatnonzero(may).tolist()
     }
     errors = np.zeros((*forces.shape, max(map(len, places.values()), default=0)))
@@ -65,21 +62,21 @@ def _on_either_side(
     return np.asarray(0.5 * WRONG_SIDE * errors * sizes_mm[:, None])
 
 
-def _other_places(at: Placement, forces: Array, sizes_mm: Array, acts: Acts) -> Array:
+def _other_places(at: Placement, forces: Array, sizes_mm: Array, weight: Weight) -> Array:
     """The sides of the legs (k, 6) where they balance too, and of each leg whose side is not known."""
     sides = np.tile(_sides(forces), (len(EVERY), 1))
-    is_balanced = (_sides_at(at, sides, EVERY, sizes_mm, acts) == EVERY).all(axis=1)
+    is_balanced = (_sides_at(at, sides, EVERY, sizes_mm, weight) == EVERY).all(axis=1)
     unsure = np.abs(forces) < HARDLY_LOADED
     differ = sides != EVERY
     is_other = is_balanced | (differ @ unsure & (differ.sum(axis=1) == 1))
     return np.asarray(EVERY[is_other & differ.any(axis=1)])
 
 
-def _sides_at(at: Placement, sides: Array, others: Array, sizes_mm: Array, acts: Acts) -> Array:
+def _sides_at(at: Placement, sides: Array, others: Array, sizes_mm: Array, weight: Weight) -> Array:
     """On which sides the legs would lie if they lay on ``others``, and not as now."""
     twists = 0.5 * at.by_constraints @ ((sides - others) * sizes_mm)[..., None]
     moved = replace(at, poses=apply_twist(at.poses, twists[..., 0]))
-    return _sides(leg_forces(moved, *acts))
+    return _sides(leg_forces(moved, weight))
 
 
 def _rows(placement: Placement, rows: NDArray[np.intp]) -> Placement:

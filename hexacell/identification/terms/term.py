@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hexacell.identification.placement import Placement
+from hexacell.identification.placement import Placement, Weight
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
 
@@ -39,6 +39,8 @@ class ModelTerm:
         needs_directions: whether it acts by the side from which joints arrive.
         on_either_side: the errors of legs that may have either sign, as nobody knows on which side they are
             there; None where that is always known.
+        weight: under which it acts; None where that does not matter.
+        of_weight: the same term under another weight.
         mean: coefficients (6,) as they are expected.
         sigma: one standard deviation of each (6,), where they were identified before; None: see ``size``.
     """
@@ -50,6 +52,8 @@ class ModelTerm:
     takes_up: str = ""
     needs_directions: bool = False
     on_either_side: ErrorsOfSizes | None = None
+    weight: Weight | None = None
+    of_weight: Callable[[Weight], ModelTerm] | None = None
     mean: Array = field(default_factory=lambda: np.zeros(LEGS))
     sigma: Array | None = None
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from hexacell.identification.placement import Weight
 from hexacell.identification.terms.backlash import backlash
 from hexacell.identification.terms.compliance import compliance
 from hexacell.identification.terms.play import play
@@ -37,5 +38,5 @@ def effect_of(coefficients: Mapping[str, Array], warmer_k: float = 0.0) -> Effec
 def terms_of(robot: Robot) -> tuple[ModelTerm, ...]:
     """What is looked for on a robot whose owner states that weight."""
     base = robot.mechanism.normalize_frames(robot.drawing)[1].base
-    acts = base @ DOWN, CENTRE_MM
-    return backlash(0.1), play(0.1, *acts), compliance(0.3, NEWTON, *acts)
+    weight = Weight(base @ DOWN, CENTRE_MM)
+    return backlash(0.1), play(0.1, weight), compliance(0.3, NEWTON, weight)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hexacell.identification.estimator import identify
-from hexacell.identification.placement import Placement, leg_forces
+from hexacell.identification.placement import Placement, Weight, leg_forces
 from hexacell.uncertainty.effect_kinds import own_weight
 from hexacell.uncertainty.effects import Occurrence, errors_by_effects
 from tests.hexacell.altered_records import altered
@@ -25,7 +25,7 @@ def placement(noisy, make_problem):
 
 
 def test_the_legs_hold_the_weight_in_balance(placement):
-    forces = leg_forces(placement, DOWN, CENTRE_MM)
+    forces = leg_forces(placement, Weight(DOWN, CENTRE_MM))
     legs = placement.mechanism.legs(placement.geometry, placement.poses, placement.joints)
     # A leg that is pulled draws the platform towards its base.
     pulls = forces[..., None] * legs.directions
@@ -37,7 +37,7 @@ def test_the_legs_hold_the_weight_in_balance(placement):
 
 def test_a_stated_weight_makes_no_healthy_machine_doubtful(noisy, make_problem, placement):
     """Without it the residuals are too large, and a person would look for a fault."""
-    forces = NEWTON * leg_forces(placement, DOWN, CENTRE_MM)
+    forces = NEWTON * leg_forces(placement, Weight(DOWN, CENTRE_MM))
     moved = np.einsum("nij,nj->ni", placement.by_constraints, 1e-3 * UM_PER_N * forces)[:, :3]
     rows = {record.id: row for row, record in enumerate(noisy.records)}
     loaded = altered(noisy, lambda r: {"deviation": np.array(r.deviation) + moved[rows[r.id]]})
@@ -45,7 +45,7 @@ def test_a_stated_weight_makes_no_healthy_machine_doubtful(noisy, make_problem, 
     unstated = identify(problem)
     assert not unstated.goodness.is_explained
     for centre in (CENTRE_MM, None):
-        effect = own_weight(NEWTON, UM_PER_N, DOWN, centre)
+        effect = own_weight(NEWTON, UM_PER_N, Weight(DOWN, centre))
         assert effect.occurrence is Occurrence.CONSTANT
         stated = identify(replace(problem, systematic=partial(errors_by_effects, (effect,))))
         assert stated.goodness.is_explained

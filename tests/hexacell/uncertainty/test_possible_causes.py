@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hexacell.identification.estimator import identify
-from hexacell.identification.placement import Placement, leg_forces
+from hexacell.identification.placement import Placement, Weight, leg_forces
 from hexacell.identification.solver.chi_square import ChiSquareVerdict
 from hexacell.uncertainty.effect_kinds import load_at_work, rail_waves
 from hexacell.uncertainty.possible_causes import ExcessTest, possible_causes
@@ -84,7 +84,7 @@ def test_a_load(found_with, moved):
 
 def test_clearance_that_changes_sides_with_the_load(found_with, clean):
     placement = Placement(clean.problem.mechanism, clean.geometry, clean.poses, clean.problem.joints)
-    sides = np.sign(leg_forces(placement, np.array([0.0, 0.0, -1.0])))
+    sides = np.sign(leg_forces(placement, Weight(np.array([0.0, 0.0, -1.0]))))
     assert (np.ptp(sides, axis=0) > 0.0).any()
     moved = placement.by_constraints[:, :3] @ (0.1 * sides)[..., None]
     assert first(found_with(deviations=moved[..., 0])) == CLEARANCE

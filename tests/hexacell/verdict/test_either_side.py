@@ -8,6 +8,7 @@ import pytest
 from drivers.simulated.imperfections import LoadedMachine
 from hexacell.campaign.task_accuracy import Task
 from hexacell.identification.belief import RobotBelief
+from hexacell.identification.placement import Weight
 from hexacell.identification.solver.term_estimates import TermEstimates
 from hexacell.identification.terms.corrected_joints import commanded_joints
 from hexacell.identification.terms.play import play
@@ -33,7 +34,7 @@ def belief(robot: Robot) -> RobotBelief:
     """The robot of Table 1 with play that its controller knows."""
     truth = truth_of(bundled(), robot, 0)
     down = robot.mechanism.normalize_frames(robot.drawing)[1].base @ DOWN
-    term = play(0.1, down, np.array(CENTRE_MM)).identified_as(np.full(6, PLAY_MM), np.full(6, 0.01))
+    term = play(0.1, Weight(down, np.array(CENTRE_MM))).identified_as(np.full(6, PLAY_MM), np.full(6, 0.01))
     free = robot.mechanism.convention.free_parameters(truth)
     return replace(robot.belief(), free=free, terms=TermEstimates.expected((term,), len(free)))
 

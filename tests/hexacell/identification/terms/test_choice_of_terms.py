@@ -13,6 +13,7 @@ import pytest
 
 from hexacell.campaign.online_estimate import OnlineEstimator
 from hexacell.identification.estimator import identify
+from hexacell.identification.placement import Weight
 from hexacell.identification.solver.result import Identification
 from hexacell.identification.terms.compliance import compliance
 from hexacell.identification.terms.finding import Finding
@@ -24,6 +25,7 @@ from hexacell.results.absorbed_terms import absorbing
 from hexacell.results.term_result import corrections_for, impossible_terms, known_terms, term_results
 from hexacell.robot.model import Robot
 from hexacell.text.terms import terms_text
+from hexacell.uncertainty.possible_causes import possible_causes
 from tests.benchmarks.worlds import budgets
 from tests.benchmarks.worlds.campaigns import Setting, setting
 from tests.benchmarks.worlds.not_geometry import CENTRE_MM, NOTHING, effect_of, terms_of
@@ -193,7 +195,7 @@ def test_coefficients_that_no_machine_has_are_named() -> None:
     results = term_results(found)
     assert impossible_terms(robot().terms, results) == []
     base = robot().mechanism.normalize_frames(robot().drawing)[1].base
-    upwards = compliance(0.3, 100.0, base @ np.array([0.0, 0.0, 1.0]), CENTRE_MM)
+    upwards = compliance(0.3, 100.0, Weight(base @ np.array([0.0, 0.0, 1.0]), CENTRE_MM))
     wrong = identify(replace(robot(), terms=(upwards,)).problem(measured("compliance")))
     named = impossible_terms((upwards,), term_results(wrong))
     [sentence] = named
@@ -202,3 +204,22 @@ def test_coefficients_that_no_machine_has_are_named() -> None:
     less = replace(upwards, size=1e-3 * upwards.size)
     [sentence] = impossible_terms((less,), results)
     assert re.search(r"\(leg \d(, \d){2,5}\), far beyond what \[model\] states", sentence)
+
+
+@pytest.mark.parametrize("off_mm", [(0.0, 0.0, 0.0), (40.0, 0.0, 0.0), (0.0, -40.0, 0.0)])
+def test_a_weight_that_acts_elsewhere_than_stated_is_named(off_mm: tuple[float, float, float]) -> None:
+    """The sides of the legs are then others than those by the stated place."""
+    offered = tuple(
+        term
+        if term.weight is None or term.of_weight is None
+        else term.of_weight(term.weight.moved(np.array(off_mm)))
+        for term in robot().terms
+    )
+    found = identify(replace(robot(), terms=offered).problem(measured("play")))
+    named = [one.name for one in possible_causes(found) if "own_weight_centre_mm" in one.name]
+    assert found.goodness.is_explained == (not any(off_mm)) == (not named)
+    if named:
+        axis = int(np.argmax(np.abs(off_mm)))
+        says = [float(number) for number in re.findall(r"([-+]\d+) mm", named[0])]
+        assert np.sign(says[axis]) == -np.sign(off_mm[axis])
+        assert 15.0 < abs(says[axis]) < 60.0

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.identification.placement import Placement, RecordPlacement, leg_forces
+from hexacell.identification.placement import Placement, RecordPlacement, Weight, leg_forces
 from hexacell.identification.terms.backlash import backlash
 from hexacell.identification.terms.compliance import compliance
 from hexacell.identification.terms.play import play
@@ -18,6 +18,7 @@ from hexacell.robot.model import robot_of
 from tests.benchmarks.machines import bundled
 
 DOWN = np.array([0.0, 0.0, -1.0])
+WEIGHT = Weight(DOWN)
 LEGS_WITH_LENGTHS = ("simulated-hexaglide", "gough-stewart")
 SMALL_MM = 1e-4
 
@@ -56,8 +57,8 @@ def test_a_leg_that_is_pulled_is_longer(placement):
     """A leg of another length, by the kinematics: of the side to which play puts it, and as it yields."""
     if "l" not in placement.geometry.parameters.slices:
         return  # its legs are the joints; that these sink is tested below
-    forces = leg_forces(placement, DOWN)
-    terms = (play(0.1, DOWN), 0.5 * np.sign(forces)), (compliance(0.3, 100.0, DOWN), 0.1 * forces)
+    forces = leg_forces(placement, WEIGHT)
+    terms = (play(0.1, WEIGHT), 0.5 * np.sign(forces)), (compliance(0.3, 100.0, WEIGHT), 0.1 * forces)
     for term, longer in terms:
         every = term.pose_errors(placement, placement.directions)
         for leg in range(6):
@@ -70,7 +71,7 @@ def test_a_leg_that_is_pulled_is_longer(placement):
 
 def test_the_platform_sinks_under_its_weight(placement):
     """Legs that yield to a weight let it down: it would do work otherwise, whatever the mechanism."""
-    down = compliance(0.3, 100.0, DOWN).pose_errors(placement, placement.directions).sum(axis=-1)
+    down = compliance(0.3, 100.0, WEIGHT).pose_errors(placement, placement.directions).sum(axis=-1)
     arms = _middle(placement) - placement.poses.positions
     let_down = down[:, :3] @ DOWN + np.einsum(
         "ni,ni->n", np.cross(down[:, 3:], arms), np.tile(DOWN, (20, 1))
@@ -85,7 +86,7 @@ def _middle(placement: Placement) -> np.ndarray:
 
 
 def test_coefficients_share_a_part_and_have_their_own(placement):
-    term = play(0.1, DOWN)
+    term = play(0.1, WEIGHT)
     assert term.spread @ term.spread.T == pytest.approx(0.01 * (np.ones((6, 6)) + np.eye(6)))
     known = np.arange(20) != 3
     taken = TakenTerms.of((term,), placement, known)

@@ -161,7 +161,7 @@ def own_weight(newton: float, um_per_n: float, weight: Weight) -> Effect:
     Args:
         newton: how heavy it is.
         um_per_n: compliance of a leg with its joints, one standard deviation.
-            weight: how it acts.
+        weight: how it acts.
     """
 
     def yielding(placement: Placement) -> Array:

@@ -1,12 +1,12 @@
 """Devices that were found, in words and as text for a cell file; and one that was watched."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import tomlkit
 
 from drivers.discovery.encoders import BusFindings, FoundFrame, FoundNode
-from drivers.discovery.gauges import FoundGauge, PortFindings
+from drivers.discovery.gauges import PortFindings
 from drivers.serial.opening import SerialPortFound
 from hexacell.kinematics.parameters import LEGS, JointUnit
 from hexacell.services.devices import device_search
@@ -37,17 +37,35 @@ def search_lines(found: device_search.SearchFindings) -> Iterator[str]:
         yield f"Controller at {found.controller.host}:{found.controller.port}: {found.controller.greeting}"
 
 
-def cell_lines(found: device_search.SearchFindings) -> Iterator[str]:
-    """The sections of a cell file for what was found; the axes are guesses, as no device reports them."""
-    for axis, gauge in zip(AXES, device_search.found_gauges(found), strict=False):
-        yield from _gauge_section(axis, gauge)
+def cell_text(found: device_search.SearchFindings) -> str:
+    """The sections of a cell file for what was found, and what is guessed in them; empty for nothing."""
+    notes: list[str] = []
+    document: dict[str, Any] = {}
+    if gauges := device_search.found_gauges(found)[: len(AXES)]:
+        notes.append("axis: the base axis along which a gauge's plunger moves. Press it, and correct this.")
+        notes.append("sign: -1 if the gauge shows less when the ball moves along that axis.")
+        document["gauges"] = [
+            {"name": axis, "axis": axis, "sign": 1, "protocol": gauge.protocol, "port": gauge.port}
+            | device_search.gauge_keys(gauge)
+            for axis, gauge in zip(AXES, gauges, strict=False)
+        ]
     if bank := device_search.found_bank(found):
-        yield from _encoder_section(*bank)
-    elif (bus := device_search.unknown_encoders(found)) is not None:
-        yield from _described_encoder_section(bus)
-    if found.controller is not None:
-        address = {"host": found.controller.host, "port": found.controller.port}
-        yield from ("[controller]", *_keys({"protocol": "linuxcncrsh", **address}), "")
+        bus, encoders = bank
+        nodes = [node.node for node in encoders]
+        notes.append(f"nodes: those of legs 1 to 6{'' if len(nodes) == LEGS else ': six are needed'}.")
+        document["encoders"] = {"protocol": "cia406", "bus": bus.bus, "nodes": nodes}
+        document["encoders"] |= device_search.encoder_keys(encoders)
+    elif (unknown := device_search.unknown_encoders(found)) is not None:
+        frames = ", ".join(map(_number, unknown.frames[:MOST_FRAMES]))
+        notes.append("encoders.dbc: the file of their maker; a count is no coarser than its steps.")
+        notes.append(f"signals: Message.Signal of legs 1 to 6, from the messages among {frames}.")
+        signals = [f"ENC{leg}.Position" for leg in range(1, LEGS + 1)]
+        document["encoders"] = {"protocol": "dbc", "bus": unknown.bus, "measuring_step_nm": 1000}
+        document["encoders"]["dbc"] = {"file": "encoders.dbc", "signals": signals}
+    if (controller := found.controller) is not None:
+        document["controller"] = {"protocol": "linuxcncrsh", "host": controller.host}
+        document["controller"]["port"] = controller.port
+    return "".join(f"# {note}\n" for note in notes) + tomlkit.dumps(document)
 
 
 def _port_lines(
@@ -112,45 +130,6 @@ def _node_words(node: FoundNode) -> str:
 def _number(frame: FoundFrame) -> str:
     """An identifier in the format of candump: 11 bits in three digits, 29 in eight."""
     return f"{frame.identifier:0{8 if frame.is_extended else 3}X}"
-
-
-def _gauge_section(axis: str, gauge: FoundGauge) -> Iterator[str]:
-    yield "[[gauges]]"
-    yield from _keys({"name": axis})
-    yield f'axis = "{axis}"  # the base axis along which its plunger moves: press it, and correct this'
-    yield "sign = 1    # -1 if it shows less when the ball moves along that axis"
-    yield from _keys({"protocol": gauge.protocol, "port": gauge.port, **device_search.gauge_keys(gauge)})
-    yield ""
-
-
-def _encoder_section(bus: BusFindings, encoders: tuple[FoundNode, ...]) -> Iterator[str]:
-    nodes = [node.node for node in encoders]
-    needed = "" if len(nodes) == LEGS else ": six are needed"
-    yield from ("[encoders]", *_keys({"protocol": "cia406"}))
-    yield f"bus = {{ {', '.join(_keys(bus.bus))} }}"
-    yield f"nodes = {nodes}  # of legs 1 to 6{needed}"
-    yield from _keys(device_search.encoder_keys(encoders))
-    yield ""
-
-
-def _described_encoder_section(bus: BusFindings) -> Iterator[str]:
-    """Encoders that only a DBC file describes: which of the frames are theirs is not known."""
-    frames = [_number(frame) for frame in bus.frames[:MOST_FRAMES]]
-    yield from ("[encoders]", *_keys({"protocol": "dbc"}))
-    yield f"bus = {{ {', '.join(_keys(bus.bus))} }}"
-    yield "measuring_step_nm = 1000  # no coarser than the steps in the DBC file"
-    yield ""
-    yield "[encoders.dbc]"
-    yield 'file = "encoders.dbc"  # of their maker'
-    yield f"# Message.Signal of legs 1 to 6, from the messages among {', '.join(frames)}:"
-    yield from _keys({"signals": [f"ENC{leg}.Position" for leg in range(1, LEGS + 1)]})
-    yield ""
-
-
-def _keys(values: Mapping[str, Any]) -> Iterator[str]:
-    """Lines of a TOML file."""
-    for name, value in values.items():
-        yield f"{name} = {tomlkit.item(value).as_string()}"
 
 
 MEANING = {

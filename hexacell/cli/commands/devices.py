@@ -55,7 +55,7 @@ def _search(options: argparse.Namespace, console: Console) -> ExitCode:
     buses = [_bus(words) for words in options.can]
     address = _address(options.controller)
     found = asyncio.run(search_devices(options.ports, buses, address))
-    text = "\n".join(found_devices.cell_lines(found))
+    text = found_devices.cell_text(found)
     console.document(asdict(found) | {"cell": text})
     for line in found_devices.search_lines(found):
         console.print(wrapped(line))

@@ -32,78 +32,51 @@ OTHER_LEG_GAIN = 20.0
 """Gain of twice the log-likelihood above which another leg changed too: 4.5 standard deviations."""
 
 REFERENCE = 0.5
-"""Half the shift that is found soonest, in standard deviations of a value."""
+"""k, what is subtracted from each value: half the shift that is found soonest, in standard deviations."""
 
 STATES = 250
 HIGHEST = 20.0
 """Largest limit considered, in standard deviations of a value."""
 
 
-def one_sided_run_length(limit: float, reference: float, shift: float = 0.0) -> float:
-    """The mean number of values until a sum from 0 exceeds ``limit``.
-
-    Args:
-        limit: h, in standard deviations of a value.
-        reference: k, what is subtracted from each value: half the shift that is looked for.
-        shift: mean of the values.
-    """
+def one_sided_run_length(limit: float, shift: float = 0.0) -> float:
+    """The mean number of values, of mean ``shift``, until a sum from 0 exceeds ``limit``."""
     width = 2.0 * limit / (2 * STATES - 1)
     centres = width * np.arange(STATES)
-    steps = centres[None, :] - centres[:, None] + reference - shift
+    steps = centres[None, :] - centres[:, None] + REFERENCE - shift
     stays = normal_probability(steps + 0.5 * width) - normal_probability(steps - 0.5 * width)
     stays[:, 0] = normal_probability(steps[:, 0] + 0.5 * width)
     return float(np.linalg.solve(np.eye(STATES) - stays, np.ones(STATES))[0])
 
 
-def two_sided_run_length(limit: float, reference: float, shift: float = 0.0) -> float:
+def two_sided_run_length(limit: float, shift: float = 0.0) -> float:
     """The mean number of values until one of the sums upwards and downwards exceeds ``limit``."""
-    up, down = (one_sided_run_length(limit, reference, one) for one in (shift, -shift))
+    up, down = (one_sided_run_length(limit, one) for one in (shift, -shift))
     return 1.0 / (1.0 / up + 1.0 / down)
 
 
-def limit_for_run_length(run_length: float, reference: float, streams: int = 1) -> float:
-    """The limit h of two-sided sums over some streams, for one false alarm in ``run_length`` of them all.
+@cache
+def alarm_limit(streams: int) -> float:
+    """The limit h of two-sided sums over some streams, for one false alarm in ``QUIET_RUNS`` of them all.
 
     Streams may depend on each other: the rates of their alarms add all the same, or less.
     """
 
     def excess(limit: float) -> float:
-        return float(np.log(two_sided_run_length(limit, reference) / (streams * run_length)))
+        return float(np.log(two_sided_run_length(limit) / (streams * QUIET_RUNS)))
 
     from scipy.optimize import brentq  # noqa: PLC0415 - a fifth of a second that only a watch needs
 
     return float(brentq(excess, 0.1, HIGHEST, xtol=1e-6))
 
 
-@cache
-def alarm_limit(streams: int) -> float:
-    """The limit of the watch over so many streams."""
-    return limit_for_run_length(QUIET_RUNS, REFERENCE, streams)
+def sums_after(sums: Array, values: Array) -> Array:
+    """The sums (2, m) of m streams, upwards and downwards, with one more value of each (m,).
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CumulativeSums:
-    """The sums (m,) of m streams of standard normal values upwards and downwards; never negative."""
-
-    up: Array
-    down: Array
-
-    @classmethod
-    def at_rest(cls, streams: int) -> CumulativeSums:
-        """The sums before the first value."""
-        return cls(np.zeros(streams), np.zeros(streams))
-
-    def after(self, values: Array) -> CumulativeSums:
-        """The sums with one more value of each stream (m,); NaN where a stream has no value this time."""
-        is_known = ~np.isnan(values)
-        up = np.where(is_known, np.maximum(0.0, self.up + values - REFERENCE), self.up)
-        down = np.where(is_known, np.maximum(0.0, self.down - values - REFERENCE), self.down)
-        return CumulativeSums(up, down)
-
-    @property
-    def largest(self) -> Array:
-        """The larger sum (m,) of each stream."""
-        return np.maximum(self.up, self.down)
+    They begin at zero and are never negative. NaN where a stream has no value this time.
+    """
+    both = np.maximum(0.0, sums + np.stack([values, -values]) - REFERENCE)
+    return np.where(np.isnan(values), sums, both)
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,14 +116,14 @@ class DriftWatch:
         self._runs: list[RunEvidence] = []
         self._known = CarriedPosterior.diffuse(causes.free, causes.by_state.shape[1] - causes.free)
         self._periods = [(0, self._known)]  # first run after each change, and what was known before it
-        self._sums = CumulativeSums.at_rest(len(causes.legs))
+        self._sums: Array = np.zeros((2, len(causes.legs)))
 
     def add(self, run: RunEvidence) -> StepAlarm | None:
         """Take one more run; the alarm that it raises, if any."""
-        self._sums = self._sums.after(self._known.scores(run, self._causes.by_state))
+        self._sums = sums_after(self._sums, self._known.scores(run, self._causes.by_state))
         self._known = self._known.after(run)
         self._runs.append(run)
-        if self._sums.largest.max() <= alarm_limit(len(self._causes.legs)):
+        if self._sums.max() <= alarm_limit(len(self._causes.legs)):
             return None
         self.alarms.append(self._located())
         return self.alarms[-1]
@@ -158,7 +131,7 @@ class DriftWatch:
     @property
     def share_of_limit(self) -> Array:
         """The sums (m,) as shares of their limit."""
-        shares: Array = self._sums.largest / alarm_limit(len(self._causes.legs))
+        shares: Array = self._sums.max(axis=0) / alarm_limit(len(self._causes.legs))
         return shares
 
     def attributed(self, change: int) -> StepAlarm:
@@ -190,7 +163,7 @@ class DriftWatch:
         known = before.after(*self._runs[offset:start]).forgetting(forgotten)
         self._periods.append((start, known))
         self._known = known.after(*self._runs[start:])
-        self._sums = CumulativeSums.at_rest(len(self._causes.legs))
+        self._sums = np.zeros_like(self._sums)
         moved = self._causes.legs[self._gains().gains.max(axis=0) > OTHER_LEG_GAIN]
         first, last = gains.likely_runs(cause)
         return StepAlarm(

@@ -134,23 +134,17 @@ class RecordedRun:
 
     async def _until_moved(self, sent: int) -> None:
         """Wait until the cursor is moved, or moves by itself."""
-        if self._moved.is_set():
-            return
-        moved = asyncio.ensure_future(self._moved.wait())
         advancing = asyncio.ensure_future(self._advance(sent))
         try:
-            await asyncio.wait([moved, advancing], return_when=asyncio.FIRST_COMPLETED)
+            await self._moved.wait()
         finally:
-            moved.cancel()
             advancing.cancel()
 
     async def _advance(self, sent: int) -> None:
-        if self._speed == 0.0 or sent >= self.last:
-            await self._moved.wait()
-            return
-        await self._clock.sleep(self._wait_s(sent) / self._speed)
-        if self._sequence == sent:
-            self._sequence = sent + 1
+        if self._speed and sent < self.last:
+            await self._clock.sleep(self._wait_s(sent) / self._speed)
+            if self._sequence == sent:
+                self.jump(sent + 1)
 
     def _wait_s(self, sent: int) -> float:
         """The recorded time from one event to the next, s."""

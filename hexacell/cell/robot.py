@@ -86,16 +86,13 @@ class RobotSettings(Section):
 
 
 @cache
-def mechanism_named(name: str) -> Mechanism:
-    """The mechanism that is announced under a name; raises ``UsageError`` if it is not installed."""
-    found: Mechanism = load(Group.MECHANISMS, name)()
-    return found
-
-
-@cache
 def mechanism_of(name: str, *, encoder_scales: bool) -> Mechanism:
-    """The mechanism with this name, with errors of the encoders' scales if these are identified."""
-    return _with_scales(mechanism_named(name), encoder_scales=encoder_scales)
+    """The mechanism with this name, with errors of the encoders' scales if these are identified.
+
+    Raises:
+        UsageError: it is not installed.
+    """
+    return _with_scales(load(Group.MECHANISMS, name)(), encoder_scales=encoder_scales)
 
 
 def _with_scales(mechanism: Mechanism, *, encoder_scales: bool) -> Mechanism:

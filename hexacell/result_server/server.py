@@ -25,10 +25,10 @@ from cryptography import x509
 from cryptography.hazmat.primitives.serialization import Encoding
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
-from hexacell.cell.fields import LONGEST_TEXT, Password, Section
+from hexacell.cell.fields import Password, Section
 from hexacell.cell.loader import Cell
 from hexacell.cell.operation import OpcUaSettings
-from hexacell.cell.passwords import private_content
+from hexacell.cell.passwords import stated_secrets
 from hexacell.errors import DeviceError, UsageError
 from hexacell.result_server.published_result import SEVERITIES, NewResults, PublishedResult
 from hexacell.storage import atomic_files
@@ -58,7 +58,7 @@ FIELDS = (
 META_DATA = 6
 """The first fields are those of ResultMetaData, the others those of ResultContent."""
 
-USER_VARIABLE, PASSWORD_VARIABLE = "HEXACELL_OPCUA_USER", "HEXACELL_OPCUA_PASSWORD"
+VARIABLES = {"user": "HEXACELL_OPCUA_USER", "password": "HEXACELL_OPCUA_PASSWORD"}
 CERTIFICATE, KEY = "certificate.der", "private-key.pem"
 VALID_DAYS = 3650
 
@@ -99,20 +99,18 @@ def allowed_reader(
 
     Raises:
         FileError: the password file cannot be read, or others can read or change it.
-        UsageError: nobody is named, and the cell file does not let anybody in.
+        UsageError: nobody is named, and the cell file does not let anybody in; or a variable is too long.
     """
-    given = [environment.get(variable, "") for variable in (USER_VARIABLE, PASSWORD_VARIABLE)]
-    if all(given) and max(map(len, given)) <= LONGEST_TEXT:
-        return Reader(*given)
-    if settings.password_file is not None:
-        content = private_content(folder / settings.password_file, ReaderFile)
-        return Reader(content.user.get_secret_value(), content.password.get_secret_value())
+    file = None if settings.password_file is None else folder / settings.password_file
+    found = stated_secrets(file, ReaderFile, VARIABLES, environment)
+    if len(found) == len(VARIABLES):
+        return Reader(**{name: value.get_secret_value() for name, value in found.items()})
     if settings.anonymous:
         return Reader()
     raise UsageError(
         "nobody may read the results",
         subject="[opcua]",
-        action=f"Name a password_file, or set {USER_VARIABLE} and {PASSWORD_VARIABLE}",
+        action=f"Name a password_file, or set {' and '.join(VARIABLES.values())}",
     )
 
 

@@ -5,7 +5,7 @@ from hexacell.text.screens.views import PlotView, Series, plot_lines
 
 def view(**changes: object) -> PlotView:
     series = Series("so far", "o", (1.0, 2.0, 15.0), (1.0, 3.0, 2.0))
-    return PlotView(**{"title": "t", "x_label": "pose", "y_label": "mm", "series": (series,)} | changes)  # type: ignore[arg-type]
+    return PlotView(**{"title": "t", "x_label": "pose", "series": (series,)} | changes)  # type: ignore[arg-type]
 
 
 def test_every_point_is_where_its_numbers_are_and_a_level_is_a_line_below() -> None:

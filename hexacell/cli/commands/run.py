@@ -6,7 +6,6 @@ import sys
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from hexacell.campaign.pose_list import pose_list_of
@@ -94,7 +93,11 @@ def _cell(options: argparse.Namespace, console: Console, mode: Mode) -> Cell:
 def demo(options: argparse.Namespace, console: Console) -> ExitCode:
     """Copy a simulated cell into a folder of its own and calibrate it there."""
     request = prepare_demo(options.folder, options.config)
-    console.print(demo_opening(request.cell.settings.mechanism.words.machine, request.cell.config_path))
+    machine = request.cell.settings.mechanism.words.machine
+    devices = "gauges on serial lines, encoders on CAN, TCP controller."
+    console.print(wrapped(f"A simulated {machine}: {devices}"))
+    console.print("The geometry in its controller's config is wrong by millimetres:")
+    console.print(f"  {request.cell.config_path}")
     return _run_to_end(request, console)
 
 
@@ -201,16 +204,6 @@ async def _calibrate(
         listeners: list[Listener] = [*further, progress, keys, watching.note]
         run = calibrate(request, listeners, queue, watching.live, watching.follow)
         return await keys.listen_during(run)
-
-
-def demo_opening(machine: str, config: Path) -> str:
-    """What the demo is about to calibrate: the kind of machine, and its controller's config."""
-    devices = "gauges on serial lines, encoders on CAN, TCP controller."
-    return (
-        f"{wrapped(f'A simulated {machine}: {devices}')}\n"
-        "The geometry in its controller's config is wrong by millimetres:\n"
-        f"  {config}"
-    )
 
 
 def resume_hint(request: RunRequest) -> str:

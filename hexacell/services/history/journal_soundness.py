@@ -17,11 +17,9 @@ from hexacell.campaign.pilots import FIRST_PILOT, MOST_TO_A_LIST, pilot_number
 from hexacell.cell.fields import LARGEST_NUMBER, GeometryDocument, SixNumbers
 from hexacell.cell.measuring import MOST_POINTS, MOST_POSES
 from hexacell.cell.model import CellSettings
-from hexacell.config.interface import ControllerLimits, JointRanges
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import LEGS
-from hexacell.kinematics.pose import AXES
 from hexacell.runs.run_folder import RunFolder
 from procedures.journal.journal import RESTORE, Entry, read_entries
 from procedures.run.keys import Phase, SetKey
@@ -182,8 +180,9 @@ class _Event:
         match self.event:
             case events.RunStarted() as started:
                 yield from self._geometries(started.controller, started.taught)
-                yield from _joint_range_problems(started.joint_ranges)
-                yield from _limit_problems(started.limits)
+                yield from _range_problems(started.joint_ranges, "joint ranges")
+                yield from _range_problems(started.limits.joints, "joint ranges")
+                yield from _range_problems(started.limits.axes, "axes")
                 if started.accepted is not None:
                     yield from self._covariance(started.accepted.covariance)
                     yield from _out_of_range(started.accepted.model_dump(exclude={"at"}), LARGEST_VARIANCE)
@@ -253,20 +252,12 @@ class _Event:
             yield "an effect has another size"
 
 
-def _joint_range_problems(ranges: JointRanges | None) -> Iterator[str]:
-    if ranges is None:
-        return
-    if len(ranges) != LEGS:
-        yield "there are six joint ranges"
-    yield from _out_of_range(ranges, LARGEST_NUMBER)
-
-
-def _limit_problems(limits: ControllerLimits) -> Iterator[str]:
-    yield from _joint_range_problems(limits.joints)
-    if limits.axes is not None:
-        if len(limits.axes) != len(AXES):
-            yield "there are six axes"
-        yield from _out_of_range([one for one in limits.axes if one is not None], LARGEST_NUMBER)
+def _range_problems(ranges: Sequence[tuple[float, float] | None] | None, what: str) -> Iterator[str]:
+    """Of joints or of axes."""
+    if ranges is not None:
+        if len(ranges) != LEGS:
+            yield f"there are six {what}"
+        yield from _out_of_range([one for one in ranges if one is not None], LARGEST_NUMBER)
 
 
 def _noise_problems(measured: events.NoiseMeasured) -> Iterator[str]:

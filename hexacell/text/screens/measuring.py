@@ -187,7 +187,6 @@ def accuracy_plot(picture: RunPicture, target_mm: float | None) -> PlotView:
     return PlotView(
         title=title,
         x_label="records",
-        y_label="mm",
         series=tuple(series),
         level=target_mm,
         level_name="" if target_mm is None else f"target {target_mm:g} mm",

@@ -118,7 +118,6 @@ def deviation_plot(state: RunState) -> PlotView:
     return PlotView(
         title="Deviation per held-out pose, mm",
         x_label="held-out pose",
-        y_label="mm",
         series=tuple(series),
         is_logarithmic=True,
         note="No held-out pose is measured yet.",
@@ -139,7 +138,6 @@ def residual_plot(picture: RunPicture) -> PlotView:
     return PlotView(
         title="Residual per record, sigma",
         x_label="record",
-        y_label="sigma",
         series=(Series("largest of x, y, z", "o", numbers, residuals),),
         level=0.0,
         note="No record beside a reference is taken yet.",

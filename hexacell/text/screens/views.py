@@ -43,7 +43,6 @@ class PlotView:
 
     title: str
     x_label: str
-    y_label: str
     series: tuple[Series, ...] = ()
     level: float | None = None
     level_name: str = ""

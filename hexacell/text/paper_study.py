@@ -1,8 +1,7 @@
 """The paper's simulations and experiment as text, documents and pictures, beside what the paper says."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from math import isfinite
-from typing import Any
 
 from hexacell.study import paper_experiment as experiment
 from hexacell.study import paper_simulation as simulation
@@ -63,19 +62,6 @@ def study_lines(study: simulation.PaperStudy) -> Iterator[str]:
         yield f"  {angles} {after} {_in_full(one.noisy):<24} {one.deviation_mm:.0f} mm"
     yield ""
     yield wrapped(NO_GAUGE)
-
-
-def finite(part: Any) -> Any:  # noqa: ANN401 - any part of a document
-    """A part of a JSON document, with null for what is not finite."""
-    match part:
-        case Mapping():
-            return {str(key): finite(one) for key, one in part.items()}
-        case list() | tuple():
-            return [finite(one) for one in part]
-        case float() if not isfinite(part):
-            return None
-        case _:
-            return part
 
 
 def _accuracy(one: simulation.MedianErrors) -> str:

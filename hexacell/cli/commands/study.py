@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass, field
 from math import isfinite
 from typing import Any, Generic, TypeVar
 
+from pydantic_core import to_jsonable_python
+
 from hexacell.cli.console import Console
 from hexacell.cli.progress import task_bar
 from hexacell.errors import ExitCode, UsageError
@@ -53,7 +55,8 @@ class ShownStudy(Generic[SummaryType]):
 
     def document(self, summary: Any) -> dict[str, Any]:  # noqa: ANN401 - a dataclass, as the study has it
         """All figures as a JSON document; what is not finite is null."""
-        document: dict[str, Any] = paper_study.finite({**self.stated, **asdict(summary)})
+        figures = {**self.stated, **asdict(summary)}
+        document: dict[str, Any] = to_jsonable_python(figures, inf_nan_mode="null")
         return document
 
 

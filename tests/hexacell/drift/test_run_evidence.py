@@ -11,6 +11,7 @@ from hexacell.drift.single_cause import single_cause_test
 from hexacell.identification.problem.prior import SystematicErrors
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import free_parameter_derivatives
+from hexacell.kinematics.rotations import Array
 
 EXPANSION_MM = 0.05 * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 
@@ -90,7 +91,8 @@ def test_the_table_of_a_textbook(limit, shift, length) -> None:
 
 def test_drawn_sums_alarm_as_often() -> None:
     values = np.random.default_rng(1).standard_normal((4000, 400))
-    sums, lengths = np.zeros((2, 400)), []
+    sums: Array = np.zeros((2, 400))
+    lengths: list[float] = []
     age = np.zeros(400)
     for row in values:
         sums, age = sums_after(sums, row), age + 1

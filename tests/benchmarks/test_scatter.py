@@ -4,7 +4,7 @@ Robots are drawn within the tolerances of the bundled cell. Their noise is measu
 those of a run. The true error is that of one round of visits to the task poses, whose scatter is drawn.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -15,7 +15,7 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.sensitivity import pose_sensitivity
 from hexacell.robot.model import Robot, robot_of
-from tests.benchmarks.figures import NEVER, at_least, least_by_chance
+from tests.benchmarks.figures import NEVER, at_least, at_most, least_by_chance
 from tests.benchmarks.machines import on_all_cores, with_gauges_of
 from tests.benchmarks.samples import sample
 from tests.benchmarks.virtual_calibration import Judged, Scatter, judged, robot_that_stands
@@ -32,10 +32,14 @@ SCATTERS = (
 
 @dataclass(frozen=True)
 class InOneRound:
-    """The largest position error in one round of visits to the task poses, whose scatter is drawn."""
+    """The largest position error in one round of visits to the task poses, whose scatter is drawn.
+
+    ``squares`` are those of the errors of the geometry alone, mm^2, and what the noise found has them be.
+    """
 
     scatter: Scatter
     random: np.random.Generator
+    squares: list[tuple[float, float]] = field(default_factory=list)
 
     def __call__(self, after: Robot, truth: Geometry, found: Identification, task: Task) -> float:
         budget = task.budget(found, after.belief(found), after.effects, {})
@@ -45,24 +49,28 @@ class InOneRound:
         by_joints = pose_sensitivity(after.mechanism, truth, actual.poses, actual.joints, 3).joints
         size = float(np.hypot(self.scatter.seen, self.scatter.unseen))
         stops = size * self.random.standard_normal((len(by_joints), 6))
-        errors = budget.errors_of(off).estimated[:, :3] + np.einsum("nij,nj->ni", by_joints, stops)
+        by_geometry = budget.errors_of(off).estimated[:, :3]
+        self.squares.append((float(np.sum(by_geometry**2)), float(np.sum(budget.noise[:, :3] ** 2))))
+        errors = by_geometry + np.einsum("nij,nj->ni", by_joints, stops)
         return float(np.linalg.norm(errors, axis=-1).max())
 
 
-def calibrated(scatter: Scatter, gauges_mm: float, number: int) -> Judged:
+def calibrated(scatter: Scatter, gauges_mm: float, number: int) -> tuple[Judged, list[tuple[float, float]]]:
     cell, random = with_gauges_of(gauges_mm), np.random.default_rng([37, number])
     robot = robot_of(cell)
     truth = robot_that_stands(cell, robot, random)
-    one = judged(cell, robot, truth, random, InOneRound(scatter, random), scatter)
+    in_one_round = InOneRound(scatter, random)
+    one = judged(cell, robot, truth, random, in_one_round, scatter)
     # What it consists of cannot be sent to another process.
-    return replace(one, done=None)
+    return replace(one, done=None), in_one_round.squares
 
 
 @pytest.mark.parametrize(("scatter", "gauges_mm"), SCATTERS, ids=str)
 def test_a_machine_that_scatters_is_calibrated_and_u_covers(
     figure, scatter: Scatter, gauges_mm: float
 ) -> None:
-    every = on_all_cores(partial(calibrated, scatter, gauges_mm), range(MACHINES))
+    done = on_all_cores(partial(calibrated, scatter, gauges_mm), range(MACHINES))
+    every = [one for one, _ in done]
     kind = "seen" if scatter.seen else "unseen"
     size_mm = scatter.seen or scatter.unseen
     what = f"joints scatter by {size_mm:g} mm, {kind} by the encoders, gauges of {gauges_mm:g} mm"
@@ -77,6 +85,9 @@ def test_a_machine_that_scatters_is_calibrated_and_u_covers(
     figure(f"{what}: passes", sum(one.is_accepted for one in every), f"of {MACHINES}")
     false = sum(one.is_false_pass for one in known)
     figure(f"{what}: pass though the error of a round is above the limit", false, "", NEVER)
+    left, bound = np.array([square for _, squares in done for square in squares]).sum(axis=0)
+    of_bound = at_most(1.1 + 2.0 / np.sqrt(18.0 * MACHINES))
+    figure("  error of the geometry over its Cramer-Rao bound, rms", np.sqrt(left / bound), "", of_bound)
     for name, values in (
         ("true error", [one.true_mm for one in known]),
         ("U", [one.u_mm for one in known]),

@@ -14,7 +14,6 @@ from pathlib import Path
 
 import pytest
 
-from hexacell.cli.app import main
 from tests.cli.cell_folder import QUICK, CellFolder, copy_cell
 
 HERE = Path(__file__).parent
@@ -92,13 +91,6 @@ def test_a_cell_is_calibrated_with_the_gauge(installed: Callable[[str], Path], c
     options = (counted.cell, "--unattended", "--mode", "optimise")
     run = python("-m", "hexacell", "run", *options, path=installed("counter_gauge"))
     assert run.returncode == 0, run.stderr
-
-
-def test_without_the_package_its_protocol_is_refused_by_name(
-    counted: CellFolder, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["preflight", str(counted.cell)]) == 2
-    assert "there is no gauge protocol 'counter'" in " ".join(capsys.readouterr().err.split())
 
 
 @pytest.mark.slow

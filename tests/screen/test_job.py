@@ -131,25 +131,18 @@ async def test_one_key_each_for_who_is_in_control(cell, run, history, opened) ->
         assert run.taken == 1
 
 
-@pytest.mark.parametrize(("size", "is_grave"), [((80, 24), False), ((80, 24), True)])
-async def test_a_long_change_leaves_in_sight_what_to_press(
-    size: tuple[int, int],
-    is_grave: bool,
-    cell: Cell,
-    run: ToldRun,
-    history: tuple[events.Event, ...],
-    opened: Opened,
-) -> None:
+@pytest.mark.parametrize("is_grave", [False, True])
+async def test_a_long_change_leaves_in_sight_what_to_press(is_grave, cell, run, history, opened) -> None:
     gate = AcceptanceGate(
         name="far", passed=not is_grave, sentence="Far. " * 40, needs_person=True, needs_cell_name=True
     )
-    async with opened(workplace_of(cell, run, history[:PROPOSED]), size) as pilot:
+    async with opened(workplace_of(cell, run, history[:PROPOSED])) as pilot:
         run.ask(ask_approval(PendingChange((gate,), "-  old\n+  new\n" * 100), cell=cell.settings.name))
         await until_shown(pilot, "+  new")
         await settled(pilot)
         last = pilot.app.screen.query("Input" if is_grave else ".choice").last()
         assert last.region.height > 0
-        assert last.region.bottom <= size[1]
+        assert last.region.bottom <= 24
         assert pilot.app.screen.get_widget_at(last.region.x, last.region.bottom - 1)[0] is last
 
 

@@ -88,6 +88,7 @@ MISTAKES = [
     ("encoder_mm = 0.01", "encoder_mm = 1e-320", "but must be more than 0: from 1e-09 to 1e.06"),
     ("gauge_scale = 0.0", "gauge_scale = 1e-320", "but must be 0 or more: 0, or from 1e-09 to 1e.06"),
     ("l = [590.0,", "l = [-590.0,", "'l' in .robot.nominal., number 1 is -590.0, but must be more than 0"),
+    ('mechanism = "hexaglide"', "mechanism = 1979-05-27", "'mechanism' in .robot. is a date or a time"),
     ('config = "', 'config = "a\\u0000', "but must be text without control characters"),
     *(
         ("base_cone_deg = 45.0", f"base_cone_deg = {cones}", "'base_cone_deg' .* one a leg")
@@ -210,17 +211,6 @@ def _file_errors(several: SeveralErrors) -> list[FileError]:
 
 PIECES = [b"[", b"]", b"{", b"}", b'"', b"'", b"=", b",", b".", b"\n", b"#", b"\\", b"nan"]
 PIECES += [b"-1", b"true", b"[[a]]\n", b'"""', b"1e999"]
-
-
-def test_a_day_in_the_place_of_the_mechanism_is_refused_by_its_line(cell_text, load_text):
-    """It looks like the name of one in a JSON document."""
-    named = re.sub(r"(?m)^mechanism = .*$", "mechanism = 1979-05-27", cell_text, count=1)
-    assert named != cell_text
-    with pytest.raises((FileError, SeveralErrors)) as refused:
-        load_text(named)
-    told = refused.value
-    mistakes = told.errors if isinstance(told, SeveralErrors) else [told]
-    assert all(isinstance(mistake, FileError) and mistake.line for mistake in mistakes)
 
 
 @given(data=st.data())

@@ -34,8 +34,6 @@ def test_the_turn_is_that_before_the_tilt():
     turns = rng.uniform(-170, 170, 20)
     untilted = PoseBatch.of([Pose(0, 0, 550, 0, 0, turn) for turn in turns])
     axis = rng.standard_normal((20, 2))
-    from scipy.spatial.transform import Rotation
-
     tilts = Rotation.from_rotvec(np.column_stack([0.3 * axis, np.zeros(20)])).as_matrix()
     poses = PoseBatch(untilted.positions, tilts @ untilted.rotations)
     np.testing.assert_allclose(np.degrees(poses.turns()), turns, atol=1e-9)

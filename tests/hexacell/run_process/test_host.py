@@ -13,7 +13,6 @@ from hexacell.errors import ExitCode
 from hexacell.run_process.host import RemoteOperator, RunHost
 from hexacell.run_process.messages import (
     EventRecorded,
-    HostFailed,
     HostMessage,
     QuestionChanged,
     RunDescribed,
@@ -204,17 +203,6 @@ async def test_where_nobody_comes_back_it_ends_and_is_resumed(hosted) -> None:
         )
         assert history_told(client)[: len(before)] == list(before)
         await client.connection.leave(keep_running=False)
-
-
-async def test_a_run_that_cannot_begin_says_why(hosted, cell) -> None:
-    cell.config_path.write_text("nothing\n")
-    async with hosted() as run:
-        client = await run.client()
-        told = await client.until_over()
-        assert await run.serving is ExitCode.USAGE
-    assert isinstance(told[-1], HostFailed)
-    assert str(cell.config_path) in told[-1].problem
-    assert told[-1].exit_code == 2
 
 
 async def test_nothing_begins_before_somebody_is_there(hosted, monkeypatch) -> None:

@@ -31,7 +31,7 @@ from procedures.calibration.held_out_poses import HeldOutPoses
 from tests.benchmarks.figures import NEVER, at_least, at_most
 from tests.benchmarks.machines import on_all_cores
 from tests.benchmarks.samples import sample
-from tests.benchmarks.virtual_calibration import robot_that_reaches, stands_at
+from tests.benchmarks.virtual_calibration import robot_that_stands, stands_at
 from tests.benchmarks.watched_robot import Seen, WatchedRobot, watch
 from tests.records_within_travel import within_travel
 from tests.simulated_campaign import SimulatedCampaign
@@ -99,14 +99,6 @@ def cell_of(case: str) -> Cell:
     return replace(cell, settings=changed(cell.settings, changes))
 
 
-def robot_at_first(cell: Cell, robot: Robot, random: np.random.Generator) -> Geometry:
-    """A robot that keeps its limits at the first reference: it goes there before anything is known."""
-    while True:
-        truth = robot_that_reaches(cell, robot, random)
-        if stands_at(robot, truth, cell.settings.identification.points[:1]):
-            return truth
-
-
 def task_sigma(cell: Cell, robot: Robot, found: Identification) -> float:
     """Predicted error at the worst task pose, one standard deviation, mm."""
     belief = robot.belief(found)
@@ -135,7 +127,7 @@ def visit_held_out(
 def outcome(number: int, case: str = "bundled") -> Outcome:
     cell = cell_of(case)
     robot, random = robot_of(cell), np.random.default_rng([11, number])
-    truth = robot_at_first(cell, robot, random)
+    truth = robot_that_stands(cell, robot, random, at_first=True)
     campaign = SimulatedCampaign(cell.settings, robot, truth, random)
     watched = watch(campaign, random)
     try:
@@ -227,7 +219,7 @@ def compared(number: int) -> tuple[float, float]:
     """The predicted error of a campaign, and of the best fixed design, on one robot."""
     cell = cell_of("bundled")
     robot, random = robot_of(cell), np.random.default_rng([12, number])
-    truth = robot_at_first(cell, robot, np.random.default_rng([11, number]))
+    truth = robot_that_stands(cell, robot, np.random.default_rng([11, number]), at_first=True)
     return outcome(number).sigma_mm, best_fixed(cell, robot, truth, random)
 
 

@@ -177,14 +177,18 @@ def robot_that_reaches(cell: Cell, robot: Robot, random: np.random.Generator) ->
             return truth
 
 
-def robot_that_stands(cell: Cell, robot: Robot, random: np.random.Generator) -> Geometry:
+def robot_that_stands(
+    cell: Cell, robot: Robot, random: np.random.Generator, *, at_first: bool = False
+) -> Geometry:
     """A robot whose passive joints and legs keep their limits too, at all points as it is sent there.
 
-    Another one would stand at a stop of a joint before it was calibrated.
+    Another one would stand at a stop of a joint before it was calibrated. ``at_first``: at the first point
+    alone, where it goes before anything is known.
     """
+    points = cell.settings.identification.points[: 1 if at_first else None]
     while True:
         truth = robot_that_reaches(cell, robot, random)
-        if stands_at(robot, truth, cell.settings.identification.points):
+        if stands_at(robot, truth, points):
             return truth
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from hexacell.cli.console import Console
+from tests.cli.cell_folder import ASK, BY_HAND, changed
 from tests.mutations.attempts import Attempt, Place, attempt
 from tests.mutations.journals import with_checksum
 from tests.mutations.texts import ANY, STRANGE_BYTES, STRANGE_NUMBERS, STRANGE_TEXTS, mutated
@@ -59,16 +60,9 @@ def typed_at_a_terminal(answers: Sequence[bytes]) -> Iterator[None]:
 def ask_before_writing(folder: Path) -> None:
     """Let a run that is resumed ask a person for approval, and for placing the gauges."""
     cell, journal = folder / CELL, folder / RUN / "journal.jsonl"
-    edits = (
-        ('approval = "automatic"', 'approval = "ask"'),
-        ('placement = "fixed"', 'placement = "by-hand"'),
-    )
     first, *others = journal.read_bytes().splitlines(keepends=True)
     record = json.loads(first)
-    text = cell.read_text()
-    for old, new in edits:
-        assert text.count(old) == 1
-        text = text.replace(old, new)
+    text = changed(cell.read_text(), (ASK, BY_HAND))
     cell.write_text(text)
     record["event"]["cell_text"] = text
     del record["crc"]

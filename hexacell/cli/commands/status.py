@@ -122,18 +122,17 @@ def metrics_text(found: Sequence[CellStatus]) -> str:
 
 
 def _lines(one: CellStatus) -> Iterator[str]:
-    judged, latest = summary_of(one.judged), one.latest
-    verdict, error = verdict_word(judged.verdict), error_with_u(judged.accuracy)
-    when, used = minute(judged.ended), "no" if one.in_use_by is None else f"by {one.in_use_by}"
-    yield f"{one.cell.settings.name[:LONGEST_NAME]:{LONGEST_NAME}} {verdict:17} {error:16} {when:17} {used}"
+    figures, latest = one.figures, one.latest
+    verdict, error = verdict_word(figures.verdict), figure_with_u(figures.position_mm, figures.expanded_mm)
+    when, used = minute(figures.judged_at), "no" if one.in_use_by is None else f"by {one.in_use_by}"
+    yield f"{figures.name[:LONGEST_NAME]:{LONGEST_NAME}} {verdict:17} {error:16} {when:17} {used}"
     if one.proposal is not None:
         yield f"  a proposal waits for a person: hexacell apply {one.proposal.folder.path}"
     if latest is not None and not (latest.summary.has_begun and latest.summary.is_over):
         yield f"  {latest.name}: {latest.summary.line}"
     if one.ends_in_future is not None:
         yield f"  {one.ends_in_future.name} ended in the future: this computer's clock is wrong, or was"
-    if one.due_at is not None:
-        yield f"  calibration due on {one.due_at:%Y-%m-%d}"
+    yield from _due_line(figures)
     if one.drift.changes:
         last = one.drift.changes[-1]
         noticed = f"noticed on {last.noticed:%Y-%m-%d}"
@@ -142,22 +141,13 @@ def _lines(one: CellStatus) -> Iterator[str]:
 
 def status_document(one: CellStatus) -> dict[str, Any]:
     """What ``status --json`` prints of a cell."""
-    judged, worst = summary_of(one.judged), one.worst_share
-    position = judged.position
-    return {
+    worst = one.worst_share
+    return one.figures.model_dump(exclude={"host", "seen_at", "latest_run", "latest_at", "mode"}) | {
         "cell": one.cell.path,
-        "name": one.cell.settings.name,
         "in_use_by": one.in_use_by,
-        "verdict": judged.verdict,
-        "position_mm": position and position.value,
-        "expanded_mm": position and position.expanded,
-        "judged_at": judged.ended,
-        "passed_at": one.passed_at,
         "in_force": one.in_force and one.in_force.folder.path,
-        "due_at": one.due_at,
         "proposal": one.proposal and one.proposal.folder.path,
         "not_begun": one.latest.summary.line if one.latest and not one.latest.summary.has_begun else None,
-        "changes": len(one.drift.changes),
         "largest_sum": worst and {"parameter": worst[0], "ratio": worst[1]},
     }
 
@@ -170,9 +160,9 @@ def _samples(one: CellStatus) -> Iterator[tuple[str, dict[str, str], str]]:
         yield "hexacell_last_run_begun", {}, str(int(one.latest.summary.has_begun))
     times = {
         "hexacell_last_run_timestamp_seconds": summary_of(one.latest).ended,
-        "hexacell_last_pass_timestamp_seconds": one.passed_at,
+        "hexacell_last_pass_timestamp_seconds": one.figures.passed_at,
         "hexacell_calibration_timestamp_seconds": summary_of(one.in_force).ended,
-        "hexacell_calibration_due_timestamp_seconds": one.due_at,
+        "hexacell_calibration_due_timestamp_seconds": one.figures.due_at,
     }
     yield from ((name, {}, repr(at.timestamp())) for name, at in times.items() if at is not None)
     if (worst := one.worst_share) is not None:
@@ -200,12 +190,16 @@ def fleet_text(cells: Sequence[FleetCell]) -> str:
 def _fleet_cell_lines(one: FleetCell) -> Iterator[str]:
     error = figure_with_u(one.position_mm, one.expanded_mm)
     yield _fleet_columns(one.name, one.host, verdict_word(one.verdict), error, minute(one.latest_at))
-    if one.due_at is not None:
-        yield f"  calibration {'OVERDUE since' if one.is_overdue else 'due on'} {one.due_at:%Y-%m-%d}"
+    yield from _due_line(one)
     if one.proposal is not None:
         yield f"  a proposal waits for a person: {one.proposal}, on {one.host}"
     if one.changes:
         yield "  the robot has changed; hexacell history --drift on its computer shows more"
+
+
+def _due_line(one: FleetCell) -> Iterator[str]:
+    if one.due_at is not None:
+        yield f"  calibration {'OVERDUE since' if one.is_overdue else 'due on'} {one.due_at:%Y-%m-%d}"
 
 
 def fleet_history_text(runs: Sequence[FleetRun]) -> str:

@@ -32,71 +32,8 @@ CLOCKS_DIFFER = timedelta(minutes=5)
 Model = TypeVar("Model", bound=Frozen)
 
 
-@dataclass(frozen=True, slots=True)
-class CellStatus:
-    """The state of one cell.
-
-    Attributes:
-        in_use_by: who holds its lock, in words; None if nobody does.
-        latest: the run that ended last, and ``judged`` the last one with a verdict.
-        in_force: the run whose config the controller has; None where it was never calibrated, or edited.
-        due_at: when the next calibration is due, where the cell file says how long one is valid.
-        proposal: the newest run whose proposal waits for a person.
-    """
-
-    cell: Cell
-    in_use_by: str | None
-    latest: PastRun | None
-    judged: PastRun | None
-    passed_at: datetime | None
-    in_force: PastRun | None
-    due_at: datetime | None
-    proposal: PastRun | None
-    drift: DriftHistory
-
-    @property
-    def ends_in_future(self) -> PastRun | None:
-        """The latest run, if by the clock of today it has not ended yet: it hides those that follow."""
-        ended = None if self.latest is None else self.latest.summary.ended
-        return self.latest if ended is not None and ended > datetime.now(UTC) + CLOCKS_DIFFER else None
-
-    @property
-    def worst_share(self) -> tuple[str, float] | None:
-        """The parameter whose cumulative sum is nearest to its limit, and how near; None without runs."""
-        return max(self.drift.shares, key=lambda one: one[1], default=None)
-
-
-def cell_status(cell: Cell) -> CellStatus:
-    """The status of a cell, from its run folders.
-
-    Raises:
-        FileError: the controller's config, or the folder of the runs, cannot be read.
-    """
-    index = RunIndex(cell)
-    runs = [run for run in past_runs(cell, index) if run.summary.ended is not None]
-    in_force = next((run for run in runs if run.is_in_controller), None)
-    return CellStatus(
-        cell=cell,
-        in_use_by=lock_holder(cell.config_path),
-        latest=next(iter(runs), None),
-        judged=next((run for run in runs if run.summary.verdict is not None), None),
-        passed_at=next((run.summary.ended for run in runs if run.summary.verdict is Verdict.PASS), None),
-        in_force=in_force,
-        due_at=next_calibration_due(cell, in_force),
-        proposal=next((run for run in runs if run.summary.has_proposal), None),
-        drift=drift_history(cell, index),
-    )
-
-
-def next_calibration_due(cell: Cell, in_force: PastRun | None) -> datetime | None:
-    """When the geometry that the controller has is no longer valid; None where that is not known."""
-    valid_days = cell.settings.acceptance.valid_days
-    ended = in_force and in_force.summary.ended
-    return ended + timedelta(days=valid_days) if ended and valid_days is not None else None
-
-
 class FleetCell(Frozen):
-    """How a cell was when it put this into the archive (UTC): its :class:`CellStatus` for others.
+    """How a cell is (UTC), in figures; its archive has those of when it last put them there.
 
     ``latest_run``, ``latest_at`` and ``mode`` are of the run that ended last, ``verdict`` to ``judged_at``
     of the last one with a verdict. ``cell`` is its file on ``host``, ``changes`` how many the watch found.
@@ -125,6 +62,80 @@ class FleetCell(Frozen):
 
 
 @dataclass(frozen=True, slots=True)
+class CellStatus:
+    """The state of one cell.
+
+    Attributes:
+        in_use_by: who holds its lock, in words; None if nobody does.
+        latest: the run that ended last, and ``judged`` the last one with a verdict.
+        in_force: the run whose config the controller has; None where it was never calibrated, or edited.
+        proposal: the newest run whose proposal waits for a person.
+        figures: the same for others who share its archive.
+    """
+
+    cell: Cell
+    in_use_by: str | None
+    latest: PastRun | None
+    judged: PastRun | None
+    in_force: PastRun | None
+    proposal: PastRun | None
+    drift: DriftHistory
+    figures: FleetCell
+
+    @property
+    def ends_in_future(self) -> PastRun | None:
+        """The latest run, if by the clock of today it has not ended yet: it hides those that follow."""
+        ended = None if self.latest is None else self.latest.summary.ended
+        return self.latest if ended is not None and ended > datetime.now(UTC) + CLOCKS_DIFFER else None
+
+    @property
+    def worst_share(self) -> tuple[str, float] | None:
+        """The parameter whose cumulative sum is nearest to its limit, and how near; None without runs."""
+        return max(self.drift.shares, key=lambda one: one[1], default=None)
+
+
+def cell_status(cell: Cell) -> CellStatus:
+    """The status of a cell, from its run folders.
+
+    Raises:
+        FileError: the controller's config, or the folder of the runs, cannot be read.
+    """
+    index = RunIndex(cell)
+    runs = [run for run in past_runs(cell, index) if run.summary.ended is not None]
+    latest = next(iter(runs), None)
+    judged = next((run for run in runs if run.summary.verdict is not None), None)
+    in_force = next((run for run in runs if run.is_in_controller), None)
+    proposal = next((run for run in runs if run.summary.has_proposal), None)
+    drift, position = drift_history(cell, index), summary_of(judged).position
+    figures = FleetCell(
+        name=cell.settings.name,
+        host=socket.gethostname(),
+        cell=str(cell.path.absolute()),
+        seen_at=datetime.now(UTC),
+        latest_run=latest and latest.name,
+        latest_at=summary_of(latest).ended,
+        mode=summary_of(latest).mode,
+        verdict=summary_of(judged).verdict,
+        position_mm=position and position.value,
+        expanded_mm=position and position.expanded,
+        judged_at=summary_of(judged).ended,
+        passed_at=next((run.summary.ended for run in runs if run.summary.verdict is Verdict.PASS), None),
+        due_at=next_calibration_due(cell, in_force),
+        proposal=proposal and proposal.name,
+        changes=len(drift.changes),
+    )
+    in_use_by = lock_holder(cell.config_path)
+    return CellStatus(cell, in_use_by, latest, judged, in_force, proposal, drift, figures)
+
+
+def next_calibration_due(cell: Cell, in_force: PastRun | None) -> datetime | None:
+    """When the geometry that the controller has is no longer valid; None where that is not known."""
+    valid_days = cell.settings.acceptance.valid_days
+    ended = in_force and in_force.summary.ended
+    return ended + timedelta(days=valid_days) if ended and valid_days is not None else None
+
+
+@dataclass(frozen=True, slots=True)
 class FleetRun:
     """One run of one of the cells; ``host`` is the computer it was run from."""
 
@@ -145,27 +156,8 @@ def publish_status(status: CellStatus) -> None:
         return
     from hexacell.runs.archive import Archive  # noqa: PLC0415 - SQLAlchemy only where it is used
 
-    latest, judged = summary_of(status.latest), summary_of(status.judged)
-    position = judged.position
-    shown = FleetCell(
-        name=cell.settings.name,
-        host=socket.gethostname(),
-        cell=str(cell.path.absolute()),
-        seen_at=datetime.now(UTC),
-        latest_run=status.latest and status.latest.name,
-        latest_at=latest.ended,
-        mode=latest.mode,
-        verdict=judged.verdict,
-        position_mm=position and position.value,
-        expanded_mm=position and position.expanded,
-        judged_at=judged.ended,
-        passed_at=status.passed_at,
-        due_at=status.due_at,
-        proposal=status.proposal and status.proposal.name,
-        changes=len(status.drift.changes),
-    )
     # The document is of the cell itself, and so has no run's name.
-    document = StampedDocument("", shown.model_dump_json().encode())
+    document = StampedDocument("", status.figures.model_dump_json().encode())
     with closing(Archive(runs_folder(cell), cell.settings.name, cell.settings.archive.url)) as archive:
         archive.store(DocumentKind.CELL, {"": document})
 

@@ -60,22 +60,15 @@ def in_joint_unit(section: type[SectionType], unit: JointUnit) -> type[SectionTy
         field.alias = field.validation_alias = field.serialization_alias = OF_MM.sub("_deg", of_mm.alias)
         field.default = defaults.get(name, of_mm.default)
         fields[name] = (of_mm.annotation, field)
-    made: type[SectionType] = create_model(
-        section.__name__, __base__=section, __doc__=section.__doc__, **fields
-    )
-    return made
-
-
-def cell_model(mechanism: str, *, encoder_scales: bool = False) -> type[CellSettings]:
-    """The model of the cell files of one mechanism; raises ``UsageError`` if it is not installed.
-
-    Each has one model only, however it is asked for: settings of two would never be equal.
-    """
-    return _cell_model(mechanism, encoder_scales)
+    return _derived(section, **fields)
 
 
 @cache
-def _cell_model(mechanism: str, encoder_scales: bool) -> type[CellSettings]:
+def cell_model(mechanism: str, *, encoder_scales: bool) -> type[CellSettings]:
+    """The model of the cell files of one mechanism; raises ``UsageError`` if it is not installed.
+
+    Each has one model only: settings of two would never be equal.
+    """
     found = mechanism_of(mechanism, encoder_scales=encoder_scales)
     parameters = found.parameters
     geometry, tolerances = geometry_settings(parameters), tolerance_settings(parameters)

@@ -176,7 +176,7 @@ def settings_document(cell: Cell) -> dict[str, Any]:
 
 def schema() -> dict[str, Any]:
     """The JSON Schema of a cell file, for editors and for other programs."""
-    return cell_model(DEFAULT_MECHANISM).model_json_schema()
+    return cell_model(DEFAULT_MECHANISM, encoder_scales=False).model_json_schema()
 
 
 def validated(document: TomlDocument, model: type[SectionType], path: Path) -> SectionType:

@@ -180,7 +180,7 @@ class CellDraft:
         except ValueError as error:
             return str(error)
         try:
-            validated(document, cell_model(DEFAULT_MECHANISM), self.path)
+            validated(document, cell_model(DEFAULT_MECHANISM, encoder_scales=False), self.path)
         except HexacellError as error:
             # What it says of this answer, or of its section, by their lines.
             lines = {document.line_of(answer.path), document.line_of(answer.path[:-1])}

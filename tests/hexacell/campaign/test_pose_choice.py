@@ -96,25 +96,22 @@ def at_points(campaign) -> list:
     return [one for one in campaign if isinstance(one.decision, MeasurePose)][1::3]
 
 
-def test_an_interrupted_run_goes_on_from_the_reference_where_no_line_leads_to_the_last_record(
-    two_points, at_points, monkeypatch
+@pytest.mark.parametrize("is_clear", [False, True])
+def test_an_interrupted_run_goes_on_from_the_reference_undisturbed_where_a_line_leads_to_the_last_record(
+    two_points, at_points, monkeypatch, is_clear
 ) -> None:
     """It returned over waypoints that it does not know any more; the set must not be closed for that."""
-    monkeypatch.setattr(pose_chooser, "find_route", lambda *_: None)
+    if not is_clear:
+        monkeypatch.setattr(pose_chooser, "find_route", lambda *_: None)
     for one in at_points:
         state = replace(one.state, present=two_points.reference_pose(one.decision.point))
         decided = two_points.decide(state)
         assert isinstance(decided, MeasurePose), decided
-        assert decided.orientation == one.decision.orientation
-        assert state.present not in decided.via
-
-
-def test_where_a_line_leads_there_the_pose_is_that_of_an_undisturbed_run(two_points, at_points) -> None:
-    for one in at_points:
-        state = replace(one.state, present=two_points.reference_pose(one.decision.point))
-        decided = two_points.decide(state)
-        assert isinstance(decided, MeasurePose), decided
-        assert decided.pose == one.decision.pose
+        if is_clear:
+            assert decided.pose == one.decision.pose
+        else:
+            assert decided.orientation == one.decision.orientation
+            assert state.present not in decided.via
 
 
 Choice = tuple[TravelConstraint, ReachableTargets]

@@ -16,12 +16,7 @@ from procedures.engine.commands import UnattendedOperator
 from procedures.journal.journal import read_journal
 from procedures.run.state import fold
 from procedures.steps import events
-from tests.hexacell.services.proposed_runs import a_cell, propose_run
-
-
-@pytest.fixture
-def cell(tmp_path) -> Cell:
-    return a_cell(tmp_path)
+from tests.hexacell.services.proposed_runs import propose_run
 
 
 def request(cell: Cell, folder: RunFolder) -> RunRequest:

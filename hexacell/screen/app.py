@@ -201,8 +201,10 @@ class TechnicianApp(App[int]):
     async def _confirmed(self, model: ScreenModel, action: ScreenAction, argument: str) -> str:
         """Do something, once a person has confirmed it where that is needed."""
         question = await model.confirmation(action, argument) if model.allows(action) else None
-        if question is not None and not await self.push_screen_wait(overlays.ConfirmOverlay(question)):
-            return ""
+        if question is not None:
+            consent = await self.push_screen_wait(overlays.ConfirmOverlay(question))
+            if consent is None:
+                return ""
         return await model.perform(action, argument)
 
     def action_answer(self) -> None:
@@ -233,13 +235,13 @@ class TechnicianApp(App[int]):
     def action_leave(self) -> None:
         """Quit; while a run goes on, ask what becomes of it."""
         if self.model is not None and self.model.may_leave_run:
-            self.push_screen(overlays.QuitOverlay(), self._leave)
+            self.push_screen(overlays.ConfirmOverlay(overlays.QUITTING), self._leave)
         else:
             self._leave("leave")
 
     async def action_quit(self) -> None:
         """Quit by Textual's own key, ctrl+q, too."""
-        if not isinstance(self.screen, overlays.QuitOverlay):
+        if getattr(self.screen, "view", None) is not overlays.QUITTING:
             self.action_leave()
 
     def action_help_quit(self) -> None:
@@ -248,7 +250,7 @@ class TechnicianApp(App[int]):
             f"{self.keys_in_use['quit']} leaves; what becomes of a run that goes on is asked first."
         )
 
-    def _leave(self, leaving: overlays.Leaving | None) -> None:
+    def _leave(self, leaving: str | None) -> None:
         if leaving in {"stop", "leave"}:
             self.run_worker(self._quit(keep_running=leaving == "leave"), exit_on_error=False)
 

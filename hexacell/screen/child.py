@@ -13,8 +13,8 @@ from hexacell.errors import HexacellError
 from hexacell.services.offline import try_plan
 from hexacell.services.run.calibration_run import preflight
 from hexacell.text.planning import device_line, plan_trial_lines
-from hexacell.text.screens.live import failed_items, passed_items
-from hexacell.text.screens.views import ChecklistItem
+from hexacell.text.screens.live import checked_items, failed_items
+from hexacell.text.screens.views import ChecklistItem, Mark
 from procedures.calibration.calibration import Mode
 
 
@@ -64,7 +64,7 @@ def find_preflight(path: Path, mode: Mode) -> Preflight:
         devices = asyncio.run(preflight(load_cell(path), mode, unattended=False))
     except HexacellError as error:
         return Preflight(items=failed_items(error), is_ready=False)
-    return Preflight(items=passed_items([device_line(one) for one in devices]), is_ready=True)
+    return Preflight(items=checked_items(Mark.DONE, [device_line(one) for one in devices]), is_ready=True)
 
 
 def find_plan(path: Path) -> TriedPlan:

@@ -23,7 +23,7 @@ from hexacell.text.screens.live import plan_lines, plan_note, plan_rows
 from hexacell.text.screens.measuring import accuracy_plot, fault_view, guidance, record_lines
 from hexacell.text.screens.questions import PERSON, question_view
 from hexacell.text.screens.run_picture import header_line
-from hexacell.text.screens.views import ChecklistItem, FaultView, Line, QuestionView, Urgency
+from hexacell.text.screens.views import ChecklistItem, FaultView, Line, Mark, QuestionView, Urgency
 from procedures.calibration.calibration import Mode
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Abort, Answer, MeasureAgain, Pause, Resume, Undo
@@ -134,7 +134,7 @@ class ScreenModel:
             case "preflight":
                 checked = self._checked
                 if checked is None:
-                    checked = live.unchecked_items(is_checking=self._is_checking)
+                    checked = live.checked_items(Mark.BUSY if self._is_checking else Mark.OPEN)
                 items = (*live.live_items(self._live()[0]), *checked)
                 return {
                     "instruction": (self._instruction(),),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Awaitable, Callable, Mapping
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar
 
 from textual.app import ComposeResult
 from textual.binding import BindingType
@@ -20,14 +20,13 @@ from hexacell.text.screens.views import (
     KEYS_TITLE,
     REPLAY_HELP,
     SCREEN_HELP,
+    Choice,
     FaultView,
     QuestionView,
 )
 
 if TYPE_CHECKING:
     from hexacell.screen.model import ScreenModel
-
-Leaving = Literal["stop", "leave", "stay"]
 
 LONGEST_TYPED = 200
 """What is pasted by mistake may be a whole file."""
@@ -96,14 +95,26 @@ class AnswerOverlay(ModalScreen[ScreenResultType]):
             await self.give(self.view.consent)
 
 
-class ConfirmOverlay(AnswerOverlay[bool]):
-    """Gives whether the person consented."""
+class ConfirmOverlay(AnswerOverlay[str | None]):
+    """Gives the answer; None where the person wants nothing of what is asked."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [("escape", "dismiss(False)", "No")]
+    BINDINGS: ClassVar[list[BindingType]] = [("escape", "dismiss", "No")]
 
     async def give(self, value: str | None) -> None:
         """Give an answer."""
-        self.dismiss(value is not None)
+        self.dismiss(value)
+
+
+QUITTING = QuestionView(
+    title="A run goes on here",
+    paragraphs=("What is to become of it?",),
+    instruction="Press a key:",
+    choices=(
+        Choice("s", "stop it after its step, and quit; it can be resumed", "stop"),
+        Choice("l", "quit and leave it running; `hexacell tui` comes back to it", "leave"),
+        Choice("escape", "stay here", None),
+    ),
+)
 
 
 class QuestionOverlay(AnswerOverlay[None]):
@@ -183,22 +194,3 @@ class HelpOverlay(ModalScreen[None]):
         about = [*SCREEN_HELP[self._tab].splitlines(), ""]
         replay = ["", *REPLAY_HELP.splitlines()]
         self.query_one(TextList).show([*about, f"{KEYS_TITLE}:", *keys, "", note, *replay])
-
-
-class QuitOverlay(ModalScreen[Leaving]):
-    """Asks what becomes of the run."""
-
-    BINDINGS: ClassVar[list[BindingType]] = [
-        ("s", "dismiss('stop')", "Stop it and quit"),
-        ("l", "dismiss('leave')", "Leave it running"),
-        ("escape,enter", "dismiss('stay')", "Stay"),
-    ]
-
-    def compose(self) -> ComposeResult:
-        """The question."""
-        with Vertical(id="quitting", classes="overlay"):
-            yield TextPanel("A run goes on here", classes="overlay-title")
-            yield TextPanel("What is to become of it?")
-            yield TextPanel("  s        stop it after its step, and quit; it can be resumed")
-            yield TextPanel("  l        quit and leave it running; `hexacell tui` comes back to it")
-            yield TextPanel("  Escape   stay here")

@@ -7,7 +7,7 @@ from textual.events import Paste
 from textual.pilot import Pilot
 from textual.widgets import Input
 
-from hexacell.screen.overlays import QuestionOverlay, QuitOverlay
+from hexacell.screen.overlays import ConfirmOverlay, QuestionOverlay
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.run.questions import PendingChange, ask_approval
 from tests.screen.conftest import settled
@@ -76,8 +76,8 @@ async def test_each_way_to_quit_asks_about_the_run(cell, history, opened) -> Non
         await until_shown(pilot, "point 5")
         for key in ("q", "ctrl+q"):
             await press(pilot, key, key)
-            await until(lambda: isinstance(pilot.app.screen, QuitOverlay))
-            assert [type(one) for one in pilot.app.screen_stack].count(QuitOverlay) == 1
+            await until(lambda: isinstance(pilot.app.screen, ConfirmOverlay))
+            assert [type(one) for one in pilot.app.screen_stack].count(ConfirmOverlay) == 1
             await press(pilot, "escape")
         await press(pilot, "ctrl+c")
         assert [one.message for one in pilot.app._notifications] == [

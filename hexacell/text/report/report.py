@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import date
 
 from drivers.interfaces import DeviceIdentity
+from hexacell.cell.fields import CertificateSettings
 from hexacell.services.history.reported_run import ReportedRun
 from hexacell.text.measured_noise import measured_noise_sentences, reversal_sentence
 from hexacell.text.report import results, statement
@@ -87,10 +87,14 @@ def traceability_chapter(run: ReportedRun) -> Chapter:
     """Every instrument with its serial number and certificate."""
     day, rows = run.began.date(), []
     for one in instruments(run):
-        number = one.certificate or NOT_STATED
-        if one.expanded_um is not None:
-            number = f"{number} (U {one.expanded_um:g} um)"
-        due = "" if one.due is None else f"{one.due.isoformat()}{': EXPIRED' if one.due < day else ''}"
+        number, due = NOT_STATED, ""
+        if (stated := one.certificate) is not None:
+            number = (
+                stated.number
+                if stated.expanded_um is None
+                else f"{stated.number} (U {stated.expanded_um:g} um)"
+            )
+            due = f"{stated.due or ''}{': EXPIRED' if stated.has_expired(day) else ''}"
         rows.append((one.device.name, one.device.description, one.serial_number or NOT_STATED, number, due))
     expired = ", ".join(run.settings.expired_on(day))
     text = f"Expired on the day of the run: {expired}."
@@ -133,13 +137,11 @@ def temperature_ranges(run: ReportedRun) -> dict[str, tuple[float, float]]:
 
 @dataclass(frozen=True, slots=True)
 class Instrument:
-    """An instrument of a run; ``certificate`` is its number, empty without one, ``due`` when it ends."""
+    """An instrument of a run, and its certificate, if it has one."""
 
     device: DeviceIdentity
     serial_number: str
-    certificate: str
-    due: date | None
-    expanded_um: float | None
+    certificate: CertificateSettings | None
 
 
 def instruments(run: ReportedRun) -> Iterator[Instrument]:
@@ -152,7 +154,4 @@ def instruments(run: ReportedRun) -> Iterator[Instrument]:
         found = run.settings.certificates.get("encoders" if is_encoder else f"gauge {device.name}")
         stated = (gauge.serial_number for gauge in run.settings.gauges if gauge.name == device.name)
         serial_number = device.serial_number or next(stated, "")
-        if found is None:
-            yield Instrument(device, serial_number, "", None, None)
-        else:
-            yield Instrument(device, serial_number, found.number, found.due, found.expanded_um)
+        yield Instrument(device, serial_number, found)

@@ -210,15 +210,9 @@ def failed_items(error: HexacellError) -> tuple[ChecklistItem, ...]:
     )
 
 
-def passed_items(devices: Sequence[str]) -> tuple[ChecklistItem, ...]:
-    """The items of a preflight that found nothing; ``devices`` are those that answered."""
-    return tuple(ChecklistItem(Mark.DONE, name) for name in (*devices, *NOT_CHECKED_YET))
-
-
-def unchecked_items(*, is_checking: bool) -> tuple[ChecklistItem, ...]:
-    """What a preflight is still to look at."""
-    mark = Mark.BUSY if is_checking else Mark.OPEN
-    return tuple(ChecklistItem(mark, name) for name in NOT_CHECKED_YET)
+def checked_items(mark: Mark, devices: Sequence[str] = ()) -> tuple[ChecklistItem, ...]:
+    """How all items of a preflight stand that fails nowhere; ``devices`` are those that answered."""
+    return tuple(ChecklistItem(mark, name) for name in (*devices, *NOT_CHECKED_YET))
 
 
 NOT_TRIED = "v in 2 Preflight tries the plan; then its poses are here."

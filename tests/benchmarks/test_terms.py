@@ -103,12 +103,13 @@ def is_loaded(robot: Robot, found: Identification, poses: PoseBatch) -> Array:
         return np.ones(len(poses), dtype=bool)
     joints = robot.mechanism.inverse(found.geometry, robot.branch, poses)
     at, terms = Placement(robot.mechanism, found.geometry, poses, joints), found.terms
-    either = [
-        term.on_either_side(at, np.ones_like(joints), terms.of(term.name)[0])
-        for term in terms.terms
-        if term.on_either_side is not None
-    ]
-    return ~np.any(either, axis=(0, 2, 3)) if either else np.ones(len(poses), dtype=bool)
+    surely = np.ones(len(poses), dtype=bool)
+    for term in terms.terms:
+        if term.on_either_side is not None:
+            surely &= ~term.on_either_side(at, np.ones_like(joints), terms.of(term.name)[0]).any(
+                axis=(1, 2)
+            )
+    return surely
 
 
 def carried_out(machine: Machine, number: int) -> Outcome:

@@ -77,7 +77,7 @@ def test_drawing_and_true_machine_have_right_scales_where_nothing_is_said(cell_w
 
 def test_a_config_without_a_place_for_them_is_refused_by_its_name(cell_with: CellWith) -> None:
     cell = cell_with(True, False)
-    with pytest.raises(FileError, match=r"\[geometry\] has no encoder_scale"):
+    with pytest.raises(FileError, match=r"'encoder_scale' in \[geometry\] is missing"):
         robot_of(load_cell(cell))
 
 

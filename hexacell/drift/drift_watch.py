@@ -15,7 +15,7 @@ and the sums begin anew. A leg that moves on alarms again, by what it has moved 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -108,25 +108,25 @@ class StepAlarm:
 
 
 class DriftWatch:
-    """Takes the runs of a robot in turn; ``alarms`` are those so far, each by the runs until then."""
+    """Takes the runs of a robot in turn."""
 
     def __init__(self, causes: Causes) -> None:
-        self.alarms: list[StepAlarm] = []
         self._causes = causes
         self._runs: list[RunEvidence] = []
         self._known = CarriedPosterior.diffuse(causes.free, causes.by_state.shape[1] - causes.free)
         self._periods = [(0, self._known)]  # first run after each change, and what was known before it
+        self._noticed: list[tuple[int, int, int, set[int]]] = []  # run, first, last, other legs of each
         self._sums: Array = np.zeros((2, len(causes.legs)))
 
-    def add(self, run: RunEvidence) -> StepAlarm | None:
-        """Take one more run; the alarm that it raises, if any."""
+    def add(self, run: RunEvidence) -> bool:
+        """Take one more run; whether it raises an alarm."""
         self._sums = sums_after(self._sums, self._known.scores(run, self._causes.by_state))
         self._known = self._known.after(run)
         self._runs.append(run)
-        if self._sums.max() <= alarm_limit(len(self._causes.legs)):
-            return None
-        self.alarms.append(self._located())
-        return self.alarms[-1]
+        is_raised = bool(self._sums.max() > alarm_limit(len(self._causes.legs)))
+        if is_raised:
+            self._locate()
+        return is_raised
 
     @property
     def share_of_limit(self) -> Array:
@@ -134,25 +134,24 @@ class DriftWatch:
         shares: Array = self._sums.max(axis=0) / alarm_limit(len(self._causes.legs))
         return shares
 
-    def attributed(self, change: int) -> StepAlarm:
+    def _alarm(self, change: int) -> StepAlarm:
         """An alarm with the legs and the size by the runs from the change before it to the one after it."""
-        (first, before), (place, _) = self._periods[change : change + 2]
+        (begin, before), (place, _) = self._periods[change : change + 2]
         later = self._periods[change + 2 :]
         end = max(later[0][0], place + 1) if later else len(self._runs)
-        gains = step_gains(before, self._runs[first:end], self._causes.by_state)
-        alarm = self.alarms[change]
-        legs, cause = self._likeliest(gains, place - first)
-        return replace(
-            alarm,
-            possible_legs=legs,
-            cause=cause,
-            change=float(gains.changes[place - first, cause]),
-            sigma=float(gains.sigmas[place - first, cause]),
-            other_legs=tuple(leg for leg in alarm.other_legs if leg not in legs),
-        )
+        gains, row = step_gains(before, self._runs[begin:end], self._causes.by_state), place - begin
+        legs, cause = self._likeliest(gains, row)
+        run, first, last, others = self._noticed[change]
+        size, sigma = float(gains.changes[row, cause]), float(gains.sigmas[row, cause])
+        return StepAlarm(run, first, last, legs, cause, size, sigma, tuple(sorted(others - {*legs})))
 
-    def _located(self) -> StepAlarm:
-        """The step before one of the latest runs; the watch goes on from there."""
+    @property
+    def alarms(self) -> tuple[StepAlarm, ...]:
+        """All so far, oldest first."""
+        return tuple(map(self._alarm, range(len(self._noticed))))
+
+    def _locate(self) -> None:
+        """Find the step before one of the latest runs; the watch goes on from there."""
         offset, before = self._periods[-1]
         gains = self._gains()
         legs, _ = self._likeliest(gains, gains.likeliest[0])
@@ -165,17 +164,8 @@ class DriftWatch:
         self._known = known.after(*self._runs[start:])
         self._sums = np.zeros_like(self._sums)
         moved = self._causes.legs[self._gains().gains.max(axis=0) > OTHER_LEG_GAIN]
-        first, last = gains.likely_runs(cause)
-        return StepAlarm(
-            run=len(self._runs) - 1,
-            first=offset + first,
-            last=offset + last,
-            possible_legs=legs,
-            cause=cause,
-            change=float(gains.changes[place, cause]),
-            sigma=float(gains.sigmas[place, cause]),
-            other_legs=tuple(sorted(set(moved.tolist()) - set(legs))),
-        )
+        first, last = (offset + row for row in gains.likely_runs(cause))
+        self._noticed.append((len(self._runs) - 1, first, last, set(moved.tolist()) - {*legs}))
 
     def _gains(self) -> StepGains:
         """The gains of steps since the last change."""
@@ -199,4 +189,4 @@ def watch_runs(runs: Iterable[RunEvidence], causes: Causes) -> tuple[tuple[StepA
     watch = DriftWatch(causes)
     for run in runs:
         watch.add(run)
-    return tuple(map(watch.attributed, range(len(watch.alarms)))), watch.share_of_limit
+    return watch.alarms, watch.share_of_limit

@@ -94,7 +94,7 @@ def nights_to_alarm(job: tuple[int, int]) -> float:
     step = one_sigma(before, seed % len(one.causes.legs))
     watch = DriftWatch(one.causes)
     for number, run in enumerate(one.runs(random, before + LONGEST, step, before)):
-        if watch.add(run) is not None:
+        if watch.add(run):
             return float(number - before) if number > before else np.inf
     return np.inf
 

@@ -13,9 +13,8 @@ both numbers, and only the correction is written: the nominal number stays as it
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, Self, TypeVar, cast
+from typing import Any, Protocol, TypeVar, cast
 
 from pydantic import Field, ValidationError
 
@@ -102,47 +101,6 @@ def _filled(pattern: str, values: Mapping[str, str | int]) -> str:
         ) from error
 
 
-@dataclass(frozen=True)
-class NumberKeys:
-    """The key of each parameter, of its correction if it has one, and of the signs or the signs.
-
-    ``branch`` is None for a file that is one of several and has no signs.
-    """
-
-    values: Mapping[str, str]
-    corrections: Mapping[str, str]
-    branch: tuple[str, ...] | Branch | None
-
-    @classmethod
-    def of(
-        cls, parameters: ParameterSet, options: KeyedOptions, default: DefaultKey, *, is_part: bool
-    ) -> Self:
-        """By the options; a parameter without a pattern of its own has the ``default`` key.
-
-        Raises:
-            UsageError: an option names no parameter, or a branch is missing or too many.
-        """
-        symbols = {kind.symbol for kind in parameters.kinds}
-        if unknown := sorted({*options.names, *options.corrections} - symbols):
-            raise UsageError(
-                f"config_options name '{unknown[0]}', which the mechanism has not",
-                action=f"Its parameters are {', '.join(sorted(symbols))}",
-            )
-        every = parameters.parameters
-        keys = {one.name: default(one) for one in every} | _keys_by(options.names, every)
-        branch = None if is_part and options.branch is None else _branch_of(parameters, options)
-        return cls(keys, _keys_by(options.corrections, every), branch)
-
-    def __post_init__(self) -> None:
-        named = [one for one in self.branch or () if isinstance(one, str)]
-        every = [*self.values.values(), *self.corrections.values(), *named]
-        if twice := next((one for one in every if every.count(one) > 1), None):
-            raise UsageError(
-                f"config_options: two parameters are in '{twice}'",
-                action="Distinguish them by {leg} or {index}, and by {component}",
-            )
-
-
 def _keys_by(patterns: Mapping[str, str], every: Iterable[GeometricParameter]) -> dict[str, str]:
     named = (one for one in every if one.kind.symbol in patterns)
     return {one.name: _key_of(patterns[one.kind.symbol], one) for one in named}
@@ -165,7 +123,11 @@ def _branch_of(parameters: ParameterSet, options: KeyedOptions) -> tuple[str, ..
 
 
 class KeyedConfig:
-    """A :class:`~hexacell.config.interface.ConfigFormat` of such texts."""
+    """A :class:`~hexacell.config.interface.ConfigFormat` of such texts.
+
+    Raises:
+        UsageError: an option names no parameter, two have the same key, or a branch is missing.
+    """
 
     holds: frozenset[CorrectionKind] = frozenset()
 
@@ -179,10 +141,26 @@ class KeyedConfig:
         *,
         is_part: bool,
     ) -> None:
+        symbols, every = {kind.symbol for kind in parameters.kinds}, parameters.parameters
+        if unknown := sorted({*options.names, *options.corrections} - symbols):
+            raise UsageError(
+                f"config_options name '{unknown[0]}', which the mechanism has not",
+                action=f"Its parameters are {', '.join(sorted(symbols))}",
+            )
         self._read_limits = read_limits
         self._parameters = parameters
         self._is_part = is_part
-        self._keys = NumberKeys.of(parameters, options, default, is_part=is_part)
+        # A parameter without a pattern of its own has the default key; one of several files has no signs.
+        self._keys = {one.name: default(one) for one in every} | _keys_by(options.names, every)
+        self._corrections = _keys_by(options.corrections, every)
+        self._signs = None if is_part and options.branch is None else _branch_of(parameters, options)
+        named = [one for one in self._signs or () if isinstance(one, str)]
+        keys = [*self._keys.values(), *self._corrections.values(), *named]
+        if twice := next((one for one in keys if keys.count(one) > 1), None):
+            raise UsageError(
+                f"config_options: two parameters are in '{twice}'",
+                action="Distinguish them by {leg} or {index}, and by {component}",
+            )
         self._open = open_text
         self._unit_mm = options.unit_mm
 
@@ -223,16 +201,16 @@ class KeyedConfig:
 
     def _keys_of(self, parameter: GeometricParameter) -> tuple[str, ...]:
         """The keys of the numbers whose sum it is; the last one is that which is written."""
-        keys = (self._keys.values[parameter.name], self._keys.corrections.get(parameter.name))
+        keys = (self._keys[parameter.name], self._corrections.get(parameter.name))
         return tuple(key for key in keys if key is not None)
 
     def _unit(self, parameter: GeometricParameter) -> float:
         return self._unit_mm if parameter.kind.unit is ParameterUnit.MM else 1.0
 
     def _branch(self, lookup: NumberLookup, source: Path | None) -> Branch | None:
-        if self._keys.branch is None:
+        if self._signs is None:
             return None
-        return cast("Branch", tuple(self._sign(lookup, one, source) for one in self._keys.branch))
+        return cast("Branch", tuple(self._sign(lookup, one, source) for one in self._signs))
 
     def _sign(self, lookup: NumberLookup, key: str | int, source: Path | None) -> int:
         if isinstance(key, int):

@@ -17,54 +17,6 @@ from hexacell.errors import FileError, did_you_mean
 from hexacell.storage.toml_document import KeyPath, TomlDocument, table_header
 
 
-@dataclass(frozen=True, slots=True)
-class ModelLookup:
-    """Places in the cell file by their paths; ``model`` is that of the whole file."""
-
-    model: type[Section]
-
-    def section_at(self, path: KeyPath) -> type[Section] | None:
-        """The model of the section at ``path``; None if no section belongs there."""
-        annotation = self._annotation_at(path)
-        return annotation if isinstance(annotation, type) and issubclass(annotation, Section) else None
-
-    def length_at(self, path: KeyPath) -> int | None:
-        """The length of the list at ``path``; None if any length is allowed or no list belongs there."""
-        annotation = self._annotation_at(path)
-        items = get_args(annotation) if get_origin(annotation) is tuple else ()
-        return len(items) if items and items[-1] is not Ellipsis else None
-
-    def description_at(self, path: KeyPath) -> str | None:
-        """The description of the key at ``path``, or of the key whose list contains ``path``."""
-        while path and not isinstance(path[-1], str):
-            path = path[:-1]
-        section = self.section_at(path[:-1]) if path else None
-        field = section.field_of(str(path[-1])) if section else None
-        return field.description if field else None
-
-    def header(self, path: KeyPath) -> str:
-        """The header that opens the section at ``path``: ``[robot.nominal]``, ``[[gauges]]``."""
-        return table_header((*path, 0) if self.section_at((*path, 0)) else path)
-
-    def sections_with(self, key: str) -> list[str]:
-        """The headers of the sections that have ``key``."""
-        found = self._sections(self.model, ())
-        return [self.header(path) for path, section in found if section.field_of(key)]
-
-    def _annotation_at(self, path: KeyPath) -> object:
-        annotation: object = self.model
-        for key in path:
-            annotation = _without_none(_inside(annotation, key))
-        return annotation
-
-    def _sections(self, section: type[Section], path: KeyPath) -> Iterator[tuple[KeyPath, type[Section]]]:
-        for name in map(section.key, section.model_fields):
-            for inner in ((*path, name), (*path, name, 0)):
-                if found := self.section_at(inner):
-                    yield inner, found
-                    yield from self._sections(found, inner)
-
-
 def _inside(annotation: object, key: str | int) -> object:
     if isinstance(annotation, type) and issubclass(annotation, Section):
         field = annotation.field_of(str(key))
@@ -111,7 +63,7 @@ class Diagnosis:
     """What is wrong with a document by the model of the cell file; at most ``limit`` mistakes of a kind."""
 
     document: TomlDocument
-    model: ModelLookup
+    model: type[Section]
     limit: int
 
     def unsupported_values(self) -> Errors:
@@ -139,10 +91,10 @@ class Diagnosis:
         return errors
 
     def _explain_one(self, path: KeyPath, kind: str, context: Mapping[str, Any]) -> FileError:
-        length = self.model.length_at(path)
+        length = self._length_at(path)
         if length is not None and kind in {"too_few", "too_long", "tuple_type"}:
-            is_of_sections = self.model.section_at((*path, 0)) is not None
-            each = f"sections, each beginning with {self.model.header(path)}"
+            is_of_sections = self._section_at((*path, 0)) is not None
+            each = f"sections, each beginning with {self._header(path)}"
             expected = f"{length} {each}" if is_of_sections else f"a list of {length} items"
             return self._mismatch(path, expected)
         if kind == "missing":
@@ -158,20 +110,20 @@ class Diagnosis:
         return self.document.error(path, context["problem"], context["action"])
 
     def _missing(self, path: KeyPath) -> FileError:
-        if section := self.model.section_at(path) or self.model.section_at((*path, 0)):
+        if section := self._section_at(path) or self._section_at((*path, 0)):
             keys = [section.key(name) for name, one in section.model_fields.items() if one.is_required()]
             action = f"Add it, with {', '.join(keys)}" if keys else "Add it"
-            return self.document.error(path, f"the section {self.model.header(path)} is missing", action)
-        meaning = self.model.description_at(path)
+            return self.document.error(path, f"the section {self._header(path)} is missing", action)
+        meaning = self._description_at(path)
         action = f"Add {path[-1]} = ..." + (f" ({meaning})" if meaning else "")
         return self.document.error(path, f"{self.document.place(path)} is missing", action)
 
     def _unknown(self, path: KeyPath) -> FileError:
-        parent = self.model.section_at(path[:-1])
+        parent = self._section_at(path[:-1])
         known = list(map(parent.key, parent.model_fields)) if parent else []
         kind = "section" if isinstance(self.document.value(path), dict) else "key"
         action = f"Known here: {', '.join(known)}"
-        if homes := self.model.sections_with(str(path[-1])):
+        if homes := self._sections_with(str(path[-1])):
             action = f"It belongs in {' or '.join(homes)}"
         return self.document.error(
             path,
@@ -180,7 +132,7 @@ class Diagnosis:
         )
 
     def _mismatch(self, path: KeyPath, expected: str) -> FileError:
-        meaning = self.model.description_at(path)
+        meaning = self._description_at(path)
         value, action = self.document.value(path), "Correct it"
         is_number = isinstance(value, str) and value.strip("+-").replace(".", "").isdigit()
         if is_number and "number" in expected:
@@ -188,3 +140,44 @@ class Diagnosis:
         return self.document.error(
             path, self.document.mismatch(path, expected), action + (f" ({meaning})" if meaning else "")
         )
+
+    def _section_at(self, path: KeyPath) -> type[Section] | None:
+        """The model of the section at ``path``; None if no section belongs there."""
+        annotation = self._annotation_at(path)
+        return annotation if isinstance(annotation, type) and issubclass(annotation, Section) else None
+
+    def _length_at(self, path: KeyPath) -> int | None:
+        """The length of the list at ``path``; None if any length is allowed or no list belongs there."""
+        annotation = self._annotation_at(path)
+        items = get_args(annotation) if get_origin(annotation) is tuple else ()
+        return len(items) if items and items[-1] is not Ellipsis else None
+
+    def _description_at(self, path: KeyPath) -> str | None:
+        """The description of the key at ``path``, or of the key whose list contains ``path``."""
+        while path and not isinstance(path[-1], str):
+            path = path[:-1]
+        section = self._section_at(path[:-1]) if path else None
+        field = section.field_of(str(path[-1])) if section else None
+        return field.description if field else None
+
+    def _header(self, path: KeyPath) -> str:
+        """The header that opens the section at ``path``: ``[robot.nominal]``, ``[[gauges]]``."""
+        return table_header((*path, 0) if self._section_at((*path, 0)) else path)
+
+    def _sections_with(self, key: str) -> list[str]:
+        """The headers of the sections that have ``key``."""
+        found = self._sections(self.model, ())
+        return [self._header(path) for path, section in found if section.field_of(key)]
+
+    def _annotation_at(self, path: KeyPath) -> object:
+        annotation: object = self.model
+        for key in path:
+            annotation = _without_none(_inside(annotation, key))
+        return annotation
+
+    def _sections(self, section: type[Section], path: KeyPath) -> Iterator[tuple[KeyPath, type[Section]]]:
+        for name in map(section.key, section.model_fields):
+            for inner in ((*path, name), (*path, name, 0)):
+                if found := self._section_at(inner):
+                    yield inner, found
+                    yield from self._sections(found, inner)

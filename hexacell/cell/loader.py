@@ -14,7 +14,7 @@ from typing import Any, TypeVar, get_args
 from pydantic import SecretStr, ValidationError
 
 from hexacell.cell.by_mechanism import cell_model
-from hexacell.cell.diagnostics import Diagnosis, ModelLookup
+from hexacell.cell.diagnostics import Diagnosis
 from hexacell.cell.fields import Section
 from hexacell.cell.model import CellSettings
 from hexacell.cell.robot import DEFAULT_MECHANISM
@@ -186,7 +186,7 @@ def validated(document: TomlDocument, model: type[SectionType], path: Path) -> S
         FileError: there is one mistake.
         SeveralErrors: there is more than one.
     """
-    diagnosis = Diagnosis(document, ModelLookup(model), MOST_REPORTED)
+    diagnosis = Diagnosis(document, model, MOST_REPORTED)
     errors = diagnosis.unsupported_values()
     try:
         # As JSON, because strict validation then accepts arrays as tuples.

@@ -61,7 +61,7 @@ class LineTemplates(KeyedConfig):
             parameters,
             options,
             lambda parameter: parameter.name,
-            lambda text, path: _MatchedLines.of(text, path, templates),
+            lambda text, path: _matched(text, path, templates),
             is_part=is_part,
         )
         for name in parameters.names:
@@ -116,31 +116,21 @@ def _template(line: str, leg: int, of_a_leg: set[str]) -> _LineTemplate:
     return _LineTemplate(f"{line} (leg {leg})", re.compile(rf"\s*{pattern}\s*", re.ASCII), tuple(names))
 
 
-@dataclass(frozen=True, slots=True)
-class _MatchedLines:
+class _MatchedLines(dict[str, NumberToken]):
     """A :class:`~hexacell.config.keyed_config.NumberLookup` in the lines that match."""
 
-    tokens: Mapping[str, NumberToken]
+    number, has = dict.__getitem__, dict.__contains__
 
-    @classmethod
-    def of(cls, text: str, source: Path | None, templates: Iterable[_LineTemplate]) -> _MatchedLines:
-        """Find every template; raises ``FileError`` where a line is absent, or there twice."""
-        lines, start = list[tuple[int, int, str]](), 0
-        for number, line in enumerate(text.split("\n"), start=1):
-            lines.append((number, start, line))
-            start += len(line) + 1
-        tokens: dict[str, NumberToken] = {}
-        for template in templates:
-            tokens |= _tokens(template, lines, source)
-        return cls(tokens)
 
-    def number(self, key: str) -> NumberToken:
-        """The number of a parameter."""
-        return self.tokens[key]
-
-    def has(self, key: str) -> bool:
-        """Whether a template names it."""
-        return key in self.tokens
+def _matched(text: str, source: Path | None, templates: Iterable[_LineTemplate]) -> _MatchedLines:
+    """Find every template; raises ``FileError`` where a line is absent, or there twice."""
+    lines, start, found = list[tuple[int, int, str]](), 0, _MatchedLines()
+    for number, line in enumerate(text.split("\n"), start=1):
+        lines.append((number, start, line))
+        start += len(line) + 1
+    for template in templates:
+        found |= _tokens(template, lines, source)
+    return found
 
 
 def _tokens(

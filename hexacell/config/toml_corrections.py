@@ -22,7 +22,7 @@ from typing import Annotated, TypeVar
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, ValidationError, field_validator
 
-from hexacell.cell.diagnostics import Diagnosis, ModelLookup
+from hexacell.cell.diagnostics import Diagnosis
 from hexacell.cell.fields import Direction, NotNegative, PointInRange, Section, Six
 from hexacell.config.interface import (
     LARGEST_BACKLASH,
@@ -85,7 +85,7 @@ def validated(document: TomlDocument, model: type[Model]) -> Model:
     try:
         return model.model_validate_json(document.to_json(), strict=True)
     except ValidationError as refusal:
-        errors = Diagnosis(document, ModelLookup(model), MOST_MISTAKES).explain_refusal(refusal)
+        errors = Diagnosis(document, model, MOST_MISTAKES).explain_refusal(refusal)
         raise min(errors.values(), key=lambda error: error.line or 0) from refusal
 
 

@@ -139,14 +139,11 @@ def propose(
         for path, one, old, text in zip(paths, layout.formats, texts, new, strict=True)
     )
     return ConfigChange(
-        path=first.path,
-        format=first.format,
+        **first.model_dump(),
         before=before.geometry.document(),
         after=after.document(),
         sha256_before=fingerprint_at_start,
         sha256_after=fingerprint_of(tuple(text.encode() for text in new)),
-        text_before=first.text_before,
-        text_after=first.text_after,
         further=tuple(further),
         corrections_before=before.corrections,
         corrections_after=before.corrections if corrections is None else corrections,
@@ -220,14 +217,8 @@ class Receipt(JsonRecord):
     @classmethod
     def for_change(cls, change: ConfigChange, backup_folder: Path) -> Receipt:
         """The receipt that a commit of ``change`` keeps in ``backup_folder``."""
-        return cls(
-            path=change.path,
-            format=change.format,
-            sha256_before=change.sha256_before,
-            sha256_after=change.sha256_after,
-            backup_folder=backup_folder.absolute(),
-            further=change.paths[1:],
-        )
+        same = change.model_dump(include={"path", "format", "sha256_before", "sha256_after"})
+        return cls(**same, backup_folder=backup_folder.absolute(), further=change.paths[1:])
 
     @property
     def paths(self) -> tuple[Path, ...]:

@@ -21,7 +21,6 @@ from pydantic import Field, ValidationError
 from hexacell.cell.fields import Positive, Section, Text, first_mistake
 from hexacell.config.interface import (
     ConfigPart,
-    ControllerLimits,
     NumberToken,
     number_of,
     replace_tokens,
@@ -48,7 +47,6 @@ class NumberLookup(Protocol):
 
 OpenText = Callable[[str, Path | None], NumberLookup]
 DefaultKey = Callable[[GeometricParameter], str]
-ReadLimits = Callable[[NumberLookup, Path | None], ControllerLimits]
 
 
 class KeyedOptions(Section):
@@ -78,19 +76,6 @@ def options_of(model: type[Options], format_name: str, given: Mapping[str, Any])
         ) from error
 
 
-def _key_of(pattern: str, parameter: GeometricParameter) -> str:
-    return _filled(
-        pattern,
-        {
-            "symbol": parameter.kind.symbol,
-            "leg": parameter.leg,
-            "index": parameter.leg - 1,
-            "component": parameter.component,
-            "COMPONENT": parameter.component.upper(),
-        },
-    )
-
-
 def _filled(pattern: str, values: Mapping[str, str | int]) -> str:
     try:
         return pattern.format_map(values)
@@ -102,8 +87,21 @@ def _filled(pattern: str, values: Mapping[str, str | int]) -> str:
 
 
 def _keys_by(patterns: Mapping[str, str], every: Iterable[GeometricParameter]) -> dict[str, str]:
-    named = (one for one in every if one.kind.symbol in patterns)
-    return {one.name: _key_of(patterns[one.kind.symbol], one) for one in named}
+    """The keys of the parameters whose kind has a pattern."""
+    return {
+        one.name: _filled(
+            patterns[one.kind.symbol],
+            {
+                "symbol": one.kind.symbol,
+                "leg": one.leg,
+                "index": one.leg - 1,
+                "component": one.component,
+                "COMPONENT": one.component.upper(),
+            },
+        )
+        for one in every
+        if one.kind.symbol in patterns
+    }
 
 
 def _branch_of(parameters: ParameterSet, options: KeyedOptions) -> tuple[str, ...] | Branch:
@@ -137,7 +135,6 @@ class KeyedConfig:
         options: KeyedOptions,
         default: DefaultKey,
         open_text: OpenText,
-        read_limits: ReadLimits = lambda _, __: ControllerLimits(),
         *,
         is_part: bool,
     ) -> None:
@@ -147,7 +144,6 @@ class KeyedConfig:
                 f"config_options name '{unknown[0]}', which the mechanism has not",
                 action=f"Its parameters are {', '.join(sorted(symbols))}",
             )
-        self._read_limits = read_limits
         self._parameters = parameters
         self._is_part = is_part
         # A parameter without a pattern of its own has the default key; one of several files has no signs.
@@ -170,7 +166,7 @@ class KeyedConfig:
         if self._is_part:
             there = tuple(one for one in there if any(map(lookup.has, self._keys_of(one))))
         values = {one.name: self._value(lookup, one, source) for one in there}
-        return ConfigPart(values, self._branch(lookup, source), self._read_limits(lookup, source))
+        return ConfigPart(values, self._branch(lookup, source))
 
     def rewrite(
         self, text: str, values: Mapping[str, float], corrections: Corrections | None = None

@@ -41,7 +41,7 @@ from hexacell.config.interface import (
     token_error,
     write_number,
 )
-from hexacell.config.keyed_config import KeyedOptions, NumberLookup, options_of
+from hexacell.config.keyed_config import KeyedOptions, options_of
 from hexacell.config.linuxcnc_legs import LegCorrections
 from hexacell.errors import FileError
 from hexacell.kinematics.corrections import CorrectionKind, Corrections, Six
@@ -69,17 +69,17 @@ class LinuxcncIni(LegCorrections):
             options,
             lambda parameter: parameter.name.upper(),
             lambda text, path: IniText(text, path, options.section),
-            lambda text, path: limits_in(text, path, options.unit_mm),
             is_part=is_part,
         )
 
     def read(self, text: str, source: Path | None) -> ConfigPart:
-        """As those of legs, with the backlash of the joints; raises ``FileError`` with the line."""
+        """As those of legs, with backlash and limits; raises ``FileError`` with the line."""
         part, ini = super().read(text, source), IniText(text, source, "")
         backlash = cast("Six", tuple(_backlash(ini, joint, self._unit_mm) for joint in JOINTS))
         has_place = all(ini.has_section(joint) and not ini.has(f"{joint}/{COMP_FILE}") for joint in JOINTS)
         holds = part.holds | ({CorrectionKind.BACKLASH} if has_place else set())
-        return replace(part, corrections=replace(part.corrections, backlash=backlash), holds=holds)
+        corrections, limits = replace(part.corrections, backlash=backlash), limits_in(ini, self._unit_mm)
+        return replace(part, limits=limits, corrections=corrections, holds=holds)
 
     def rewrite(
         self, text: str, values: Mapping[str, float], corrections: Corrections | None = None
@@ -262,16 +262,15 @@ def limits_of_ini(path: Path, unit_mm: float = 1.0) -> ControllerLimits:
     Raises:
         FileError: the file cannot be read, or a limit is no number, or not above the other.
     """
-    text = IniText(atomic_files.read_text(path, LARGEST_CONFIG_BYTES), path, "")
-    return limits_in(text, path, unit_mm)
+    return limits_in(IniText(atomic_files.read_text(path, LARGEST_CONFIG_BYTES), path, ""), unit_mm)
 
 
-def limits_in(ini: NumberLookup, source: Path | None, unit_mm: float) -> ControllerLimits:
-    """The limits in a text that was read from ``source``."""
-    joints = [_range(ini, section, 1.0 if _turns(ini, section) else unit_mm, source) for section in JOINTS]
+def limits_in(ini: IniText, unit_mm: float) -> ControllerLimits:
+    """The limits in a text."""
+    joints = [_range(ini, section, 1.0 if _turns(ini, section) else unit_mm) for section in JOINTS]
     axes = [
-        *(_range(ini, f"AXIS_{axis}", unit_mm, source) for axis in LINEAR),
-        *(_range(ini, f"AXIS_{axis}", 1.0, source) for axis in ANGULAR),
+        *(_range(ini, f"AXIS_{axis}", unit_mm) for axis in LINEAR),
+        *(_range(ini, f"AXIS_{axis}", 1.0) for axis in ANGULAR),
     ]
     stated = [one for one in joints if one is not None]
     return ControllerLimits(
@@ -279,28 +278,28 @@ def limits_in(ini: NumberLookup, source: Path | None, unit_mm: float) -> Control
     )
 
 
-def _turns(ini: NumberLookup, joint: str) -> bool:
+def _turns(ini: IniText, joint: str) -> bool:
     """Whether a joint is one of angles; without ``TYPE`` LinuxCNC takes it for one of lengths."""
     key = f"{joint}/TYPE"
     return ini.has(key) and ini.number(key).text.upper() == ROTARY_JOINT
 
 
-def _range(ini: NumberLookup, section: str, unit: float, source: Path | None) -> Range | None:
+def _range(ini: IniText, section: str, unit: float) -> Range | None:
     """Both limits of a joint or an axis; LinuxCNC takes an absent one for unlimited."""
-    low, high = (_limit(ini, f"{section}/{name}", source) for name in ("MIN_LIMIT", "MAX_LIMIT"))
+    low, high = (_limit(ini, f"{section}/{name}") for name in ("MIN_LIMIT", "MAX_LIMIT"))
     if low is None and high is None:
         return None
     lowest = -LARGEST_NUMBER if low is None else unit * low.value
     highest = LARGEST_NUMBER if high is None else unit * high.value
     if low is not None and high is not None and lowest >= highest:
         problem = f"MAX_LIMIT of [{section}] is not above its MIN_LIMIT, {low.text}"
-        raise token_error(high, problem, source, "Correct one of them")
+        raise token_error(high, problem, ini.source, "Correct one of them")
     return lowest, highest
 
 
-def _limit(ini: NumberLookup, key: str, source: Path | None) -> NumberToken | None:
+def _limit(ini: IniText, key: str) -> NumberToken | None:
     if not ini.has(key):
         return None
     token = ini.number(key)
-    number_of(token, source)
+    number_of(token, ini.source)
     return token

@@ -11,7 +11,7 @@ import socket
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
@@ -168,19 +168,15 @@ def _record(
 ) -> WriteRecord:
     changes = _changes(before[1], after[1], layout)
     return WriteRecord(
+        **asdict(cause),
         at=datetime.now(UTC),
-        kind=cause.kind,
-        by=cause.by,
         user=user_name(),
         host=socket.gethostname(),
-        run=cause.run,
         files=tuple(path.absolute() for path in paths),
         sha256_before=before[0],
         sha256_after=after[0],
         numbers_changed=None if changes is None else len(changes),
         largest=changes[0] if changes else None,
-        why=cause.why,
-        reason=cause.reason,
     )
 
 

@@ -77,24 +77,22 @@ NOTHING_FOUND = FoundTerms()
 
 def term_results(found: Identification) -> tuple[TermResult, ...]:
     """What was found of all terms that were offered."""
-    terms = {} if found.terms is None else {term.name: term for term in found.terms.terms}
+    taken = {}
+    if (terms := found.terms) is not None:
+        taken = {one.name: (one.unit, *map(joints_of, terms.of(one.name))) for one in terms.terms}
     results = []
     for tried in found.tried_terms:
+        unit, values, sigma = taken.get(tried.name, ("", None, None))
         result = TermResult(
             name=tried.name,
             finding=tried.finding,
             log_factor=tried.log_factor,
             predicted=None if np.isnan(tried.predicted) else tried.predicted,
             rival=tried.rival,
+            unit=unit,
+            values=values,
+            sigma=sigma,
         )
-        if found.terms is not None and tried.name in terms:
-            values, sigma = found.terms.of(tried.name)
-            update = {
-                "unit": terms[tried.name].unit,
-                "values": joints_of(values),
-                "sigma": joints_of(sigma),
-            }
-            result = result.model_copy(update=update)
         results.append(result)
     return tuple(results)
 

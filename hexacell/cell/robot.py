@@ -92,11 +92,8 @@ def mechanism_of(name: str, *, encoder_scales: bool) -> Mechanism:
     Raises:
         UsageError: it is not installed.
     """
-    return _with_scales(load(Group.MECHANISMS, name)(), encoder_scales=encoder_scales)
-
-
-def _with_scales(mechanism: Mechanism, *, encoder_scales: bool) -> Mechanism:
-    return WithEncoderScales(mechanism) if encoder_scales else mechanism
+    found: Mechanism = load(Group.MECHANISMS, name)()
+    return WithEncoderScales(found) if encoder_scales else found
 
 
 @cache
@@ -106,7 +103,7 @@ def _screw_legs(
     screws = Screws(settings.lead_mm, np.array(settings.base_axes), np.array(settings.platform_axes))
     drawn: dict[str, ArrayLike] = {"base": base, "platform": platform, "offset": np.zeros(6)}
     legs = ScrewLegs(screws, Geometry.of(GOUGH_STEWART_PARAMETERS, drawn))
-    return _with_scales(legs, encoder_scales=encoder_scales)
+    return WithEncoderScales(legs) if encoder_scales else legs
 
 
 class FurtherFileSettings(Section):

@@ -71,15 +71,11 @@ class LiveFeed:
     def _gauge(self, settings: GaugeSettings) -> GaugeSnapshot:
         shown = self._live.gauge(settings.name)
         return GaugeSnapshot(
-            name=settings.name,
-            axis=settings.axis,
-            sign=settings.sign,
+            **settings.model_dump(include={"name", "axis", "sign", "travel_mm", "middle_mm"}),
             shown_mm=None if shown.value is None else shown.value.value_mm,
             age_s=_age(shown),
             noise_mm=self._noise(settings.name),
             problem=shown.problem,
-            travel_mm=settings.travel_mm,
-            middle_mm=settings.middle_mm,
         )
 
     def _noise(self, name: str) -> float | None:

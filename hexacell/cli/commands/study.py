@@ -7,7 +7,7 @@ import argparse
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from math import isfinite
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 from pydantic_core import to_jsonable_python
 
@@ -41,16 +41,14 @@ STYLES = {
     OrientationChoice.PAPER: (GREY, "D", "-."),
 }
 
-SummaryType = TypeVar("SummaryType")
-
 
 @dataclass(frozen=True, slots=True)
-class ShownStudy(Generic[SummaryType]):
+class ShownStudy:
     """A study, its summary as lines of text and as a picture (SVG), and what is stated beside it."""
 
-    study: Study[Any, Any, SummaryType]
-    lines: Callable[[SummaryType], Iterable[str]]
-    picture: Callable[[SummaryType], str]
+    study: Study[Any, Any, Any]
+    lines: Callable[[Any], Iterable[str]]
+    picture: Callable[[Any], str]
     stated: Mapping[str, object] = field(default_factory=dict)
 
     def document(self, summary: Any) -> dict[str, Any]:  # noqa: ANN401 - a dataclass, as the study has it
@@ -132,7 +130,7 @@ def _draw_sweep(axes: Any, name: str, rows: Mapping[float, Spread]) -> None:  # 
     axes.tick_params(labelsize=7)
 
 
-_ROWS: tuple[ShownStudy[Any], ...] = (
+_ROWS: tuple[ShownStudy, ...] = (
     ShownStudy(
         simulation.PAPER,
         paper_study.study_lines,
@@ -160,7 +158,7 @@ _ROWS: tuple[ShownStudy[Any], ...] = (
     ShownStudy(DESIGN, design_lines, design_picture),
 )
 
-STUDIES: Mapping[str, ShownStudy[Any]] = {row.study.name: row for row in _ROWS}
+STUDIES: Mapping[str, ShownStudy] = {row.study.name: row for row in _ROWS}
 """All studies by their names."""
 
 

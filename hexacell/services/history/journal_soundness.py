@@ -186,7 +186,9 @@ class _Event:
                 if started.accepted is not None:
                     yield from self._covariance(started.accepted.covariance)
                     yield from _out_of_range(started.accepted.model_dump(exclude={"at"}), LARGEST_VARIANCE)
-                    yield from self._effects(started.accepted.effects)
+                    free = len(self.settings.mechanism.convention.free_names)
+                    if any(len(row) != free for rows in started.accepted.effects.values() for row in rows):
+                        yield "an effect has another size"
             case events.ProvisionalApplied() as applied:
                 yield from self._geometries(applied.geometry)
             case events.NoiseMeasured() as measured:
@@ -245,11 +247,6 @@ class _Event:
         bound = np.sqrt(np.abs(variances)[:, np.newaxis] * np.abs(variances))
         if (variances < 0.0).any() or (np.abs(covariance) > 1.001 * bound + 1e-12).any():
             yield "this is no covariance"
-
-    def _effects(self, effects: dict[str, tuple[tuple[float, ...], ...]]) -> Iterator[str]:
-        free = len(self.settings.mechanism.convention.free_names)
-        if any(len(row) != free for rows in effects.values() for row in rows):
-            yield "an effect has another size"
 
 
 def _range_problems(ranges: Sequence[tuple[float, float] | None] | None, what: str) -> Iterator[str]:

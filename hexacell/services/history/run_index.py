@@ -82,16 +82,11 @@ class RunSummary(Frozen):
     def document(self) -> dict[str, Any]:
         """What it was and found, as ``history --json`` prints it."""
         position = self.position
-        return {
-            "began": self.began,
-            "ended": self.ended,
+        return self.model_dump(include={"began", "ended", "records", "verdict", "line"}) | {
             "mode": self.mode or None,
-            "records": self.records,
-            "verdict": self.verdict,
             "position_mm": position and position.value,
             "expanded_mm": position and position.expanded,
             "limit_mm": position and position.limit,
-            "line": self.line,
             "begun": self.has_begun,
             "over": self.is_over,
             "written": self.has_written,

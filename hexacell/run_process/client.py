@@ -122,13 +122,9 @@ class HostConnection:
 
 def _is_ending(message: protocol.HostMessage) -> bool:
     """Whether a message says that the run is over."""
-    match message:
-        case protocol.EventRecorded(event=events.Ended() | events.Interrupted()):
-            return True
-        case protocol.HostFailed(exit_code=int()):
-            return True
-        case _:
-            return False
+    if isinstance(message, protocol.EventRecorded):
+        return isinstance(message.event, events.Ended | events.Interrupted)
+    return isinstance(message, protocol.HostFailed) and message.exit_code is not None
 
 
 async def connect_to_run(path: Path) -> HostConnection | None:

@@ -13,7 +13,8 @@ from hexacell.cell.loader import Cell
 from hexacell.config.layout import ConfigLayout, CurrentConfig, controller_geometry, fingerprint
 from hexacell.config.pending_write import held_config
 from hexacell.errors import FileError, HexacellError, UsageError, flatten_errors
-from hexacell.robot.model import robot_of
+from hexacell.results.result import AcceptedResult
+from hexacell.robot.model import Robot, robot_of
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.design_facts import require_design
 from hexacell.services.devices.device_setup import Connected, device_addresses, open_devices
@@ -253,16 +254,8 @@ def _resumed_start(request: RunRequest) -> events.RunStarted:
 
 def calibration_of_run(cell: Cell, started: events.RunStarted) -> Calibration:
     """The calibration or check that a run was begun for."""
-    robot = started_robot(cell.settings, started)
-    return Calibration(
-        cell.settings,
-        robot,
-        Mode(started.mode),
-        pose_list_of(cell),
-        started.accepted,
-        length_check=started.length_check,
-        effort=services.EFFORT,
-    )
+    robot, mode = started_robot(cell.settings, started), Mode(started.mode)
+    return _calibration(cell, robot, mode, started.accepted, length_check=started.length_check)
 
 
 def new_calibration(cell: Cell, mode: Mode, *, length_check: bool = False) -> Calibration:
@@ -283,12 +276,11 @@ def new_calibration(cell: Cell, mode: Mode, *, length_check: bool = False) -> Ca
         problem = f"no accepted result has this config: {why}"
         raise UsageError(problem, subject=cell.config_path, action=action)
     require_design(cell)
-    return Calibration(
-        cell.settings,
-        robot_of(cell),
-        mode,
-        pose_list_of(cell),
-        accepted,
-        length_check=length_check,
-        effort=services.EFFORT,
-    )
+    return _calibration(cell, robot_of(cell), mode, accepted, length_check=length_check)
+
+
+def _calibration(
+    cell: Cell, robot: Robot, mode: Mode, accepted: AcceptedResult | None, *, length_check: bool
+) -> Calibration:
+    settings, listed, effort = cell.settings, pose_list_of(cell), services.EFFORT
+    return Calibration(settings, robot, mode, listed, accepted, length_check=length_check, effort=effort)

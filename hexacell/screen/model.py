@@ -214,7 +214,8 @@ class ScreenModel:
         if self._reviewed is None or not all(map(is_, self._reviewed[0], seen)):
             texts = reviewing.review_texts(picture, self._workplace.cell.settings, may_write=may_write)
             shown: dict[str, tuple[Any, ...]] = {name: (text,) for name, text in texts.items()}
-            shown["verdict"] = (texts["verdict"], reviewing.verdict_urgency(picture.state))
+            urgency = reviewing.URGENCIES.get(picture.state.verdict, Urgency.ATTENTION)
+            shown["verdict"] = (texts["verdict"], urgency)
             plots = enumerate(reviewing.review_plots(picture))
             self._reviewed = (seen, shown | {f"plot-{number}": (plot,) for number, plot in plots})
         return self._reviewed[1]

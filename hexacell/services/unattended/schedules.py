@@ -130,9 +130,8 @@ def remove_schedule(cell: Cell, folder: Path | None) -> Schedule | None:
         FileError: they cannot be removed.
     """
     present = present_schedule(cell, folder)
-    if present is None:
-        return None
-    _remove_units(present.files)
+    if present is not None:
+        _remove_units(present.files)
     return present
 
 

@@ -26,7 +26,8 @@ WHAT_TO_PRESS = (
     "o      the drift of each parameter over all runs",
 )
 
-URGENCIES = {Verdict.PASS: Urgency.CALM, Verdict.FAIL: Urgency.ALARM}
+URGENCIES = {None: Urgency.CALM, Verdict.PASS: Urgency.CALM, Verdict.FAIL: Urgency.ALARM}
+"""How much attention a verdict needs, if there is one; all others need some."""
 
 
 def review_texts(
@@ -51,11 +52,6 @@ def review_texts(
         "parameters": "\n".join(parameters) or "The geometry is not identified yet.",
         "change": change or "There is no change yet.",
     }
-
-
-def verdict_urgency(state: RunState) -> Urgency:
-    """How much attention the verdict needs."""
-    return Urgency.CALM if state.verdict is None else URGENCIES.get(state.verdict, Urgency.ATTENTION)
 
 
 def review_plots(picture: RunPicture) -> tuple[PlotView, ...]:

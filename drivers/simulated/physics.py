@@ -89,6 +89,7 @@ class GaugePlaces:
         station: (3,), mm, where the ball is in the middle of the gauges' travel.
         triad: (3, 3), rows: their measuring directions.
         on_placed: called with both when they were brought somewhere.
+        are_taken_off: they are mounted anew where the ball rests next, however near.
     """
 
     def __init__(
@@ -103,6 +104,7 @@ class GaugePlaces:
         self._fixture = fixture
         self._random = random
         self._seat: int | None = None
+        self.are_taken_off = False
         self.on_placed: Callable[[Array, Array], None] = lambda _station, _triad: None
         self._place_by_hand(ball)
 
@@ -113,7 +115,9 @@ class GaugePlaces:
 
     def follow(self, ball: Array) -> None:
         """Move the gauges to the ball, where that is at rest, if it is no longer at them."""
-        if np.linalg.norm(ball - self.station) <= self._reach_mm:
+        is_near = bool(np.linalg.norm(ball - self.station) <= self._reach_mm)
+        is_near, self.are_taken_off = is_near and not self.are_taken_off, False
+        if is_near:
             return
         seat = self._seat_at(ball)
         if self._fixture is None or seat is None or self._seat is None or seat == self._seat:
@@ -195,6 +199,7 @@ class RobotPhysics:
         joints = shown / self._shown_per_mm
         self._motion = Motion(joints[[0, 0]], -1e9, 0.0)  # standstill
         self._rows_passed = 0
+        self._takes_gauges_off = False
         self._unseen = np.zeros(6), np.zeros(6)
         first = continue_solution(
             mechanism, self._truth, joints, start=start, start_geometry=commanding.geometry
@@ -231,9 +236,15 @@ class RobotPhysics:
             stated_s = 0.0 if duration_s is None else duration_s + RAMP_S
             duration = max(motion.minimum_s, distance / motion.speed, stated_s)
             self._motion, self._rows_passed = Motion(actual, self._clock.now(), duration), 0
+            self.gauges.are_taken_off |= self._takes_gauges_off
+            self._takes_gauges_off = False
             self._draw_noise()
             self.on_motion_start()
             return self._motion
+
+    def follow_another_geometry(self) -> None:
+        """A person mounts the gauges anew where the ball then goes: the next motion ends elsewhere."""
+        self._takes_gauges_off = True
 
     def stop(self) -> None:
         """Stop the joints at their present positions."""

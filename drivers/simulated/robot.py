@@ -191,6 +191,8 @@ class SimulatedMachine:
                 raise FileError(
                     "this geometry has no pose at the present joint variables", subject=self.config[0]
                 )
+            if (new.geometry.vector != self._geometry.geometry.vector).any():
+                self.physics.follow_another_geometry()
             self._geometry = new
             self._directions = self._directions[[self._place()[0] + 1] * 2]
             self._line = found.poses[[0, 0]]

@@ -115,9 +115,8 @@ class GaugePlaces:
 
     def follow(self, ball: Array) -> None:
         """Move the gauges to the ball, where that is at rest, if it is no longer at them."""
-        is_near = bool(np.linalg.norm(ball - self.station) <= self._reach_mm)
-        is_near, self.are_taken_off = is_near and not self.are_taken_off, False
-        if is_near:
+        stay, self.are_taken_off = not self.are_taken_off, False
+        if stay and np.linalg.norm(ball - self.station) <= self._reach_mm:
             return
         seat = self._seat_at(ball)
         if self._fixture is None or seat is None or self._seat is None or seat == self._seat:
@@ -167,6 +166,7 @@ class RobotPhysics:
 
     Attributes:
         on_motion_start: called when a motion has started; must return quickly.
+        commands_differ: the next motion is by another geometry, so that the gauges are mounted anew.
         gauges: where they are.
 
     It starts where a controller with the geometry ``commanding`` puts the joints for ``home``. The joints
@@ -199,7 +199,7 @@ class RobotPhysics:
         joints = shown / self._shown_per_mm
         self._motion = Motion(joints[[0, 0]], -1e9, 0.0)  # standstill
         self._rows_passed = 0
-        self._takes_gauges_off = False
+        self.commands_differ = False
         self._unseen = np.zeros(6), np.zeros(6)
         first = continue_solution(
             mechanism, self._truth, joints, start=start, start_geometry=commanding.geometry
@@ -236,15 +236,11 @@ class RobotPhysics:
             stated_s = 0.0 if duration_s is None else duration_s + RAMP_S
             duration = max(motion.minimum_s, distance / motion.speed, stated_s)
             self._motion, self._rows_passed = Motion(actual, self._clock.now(), duration), 0
-            self.gauges.are_taken_off |= self._takes_gauges_off
-            self._takes_gauges_off = False
+            self.gauges.are_taken_off |= self.commands_differ
+            self.commands_differ = False
             self._draw_noise()
             self.on_motion_start()
             return self._motion
-
-    def follow_another_geometry(self) -> None:
-        """A person mounts the gauges anew where the ball then goes: the next motion ends elsewhere."""
-        self._takes_gauges_off = True
 
     def stop(self) -> None:
         """Stop the joints at their present positions."""

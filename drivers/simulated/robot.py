@@ -191,8 +191,7 @@ class SimulatedMachine:
                 raise FileError(
                     "this geometry has no pose at the present joint variables", subject=self.config[0]
                 )
-            if (new.geometry.vector != self._geometry.geometry.vector).any():
-                self.physics.follow_another_geometry()
+            self.physics.commands_differ = new.geometry.largest_difference(self._geometry.geometry) > 0.0
             self._geometry = new
             self._directions = self._directions[[self._place()[0] + 1] * 2]
             self._line = found.poses[[0, 0]]

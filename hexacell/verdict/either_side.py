@@ -31,15 +31,12 @@ class EitherSide(Frozen):
 
 
 def places_on_either_side(robot: Robot, belief: RobotBelief, task: Task) -> tuple[EitherSide, ...]:
-    """The other places that the platform may have at poses of a task that the robot reaches.
+    """The other places that the platform may have at poses of a task, the farthest first.
 
     Args:
         robot: with the frames of its controller.
         belief: what is known of its geometry and terms.
-        task: its poses, in the mechanism's frame convention.
-
-    Returns:
-        The farthest first.
+        task: its poses that the robot reaches, in the mechanism's frame convention.
     """
     if belief.terms is None:
         return ()

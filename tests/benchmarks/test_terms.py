@@ -39,11 +39,9 @@ CANDIDATES = 512
 
 @dataclass(frozen=True)
 class Machine:
-    """Sizes of what is not geometry: from side to side, mm, mm and um/N; and how much worse it may be.
+    """Sizes of what is not geometry: from side to side, mm, mm and um/N; it gets warmer by K an hour.
 
     ``at_most`` is the largest ratio of its error to that of a machine without.
-
-    It gets warmer by ``warmer_k`` an hour.
     """
 
     backlash: float = 0.0

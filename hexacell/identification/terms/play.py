@@ -10,7 +10,6 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexacell.identification.placement import Placement, Weight, leg_forces
 from hexacell.identification.terms.term import ModelTerm
@@ -53,7 +52,7 @@ def _on_either_side(weight: Weight, placement: Placement, _directions: Array, si
         alone = sides * np.where(np.arange(LEGS) == leg, -1.0, 1.0)
         may |= (_sides_at(placement, sides, alone, sizes_mm, weight) != sides).any(axis=1)
     places = {
-        row: _other_places(_rows(placement, np.full(len(EVERY), row)), forces[row], sizes_mm, weight)
+        row: _other_places(placement, row, forces[row], sizes_mm, weight)
         for row in np.flatnonzero(may).tolist()
     }
     errors = np.zeros((*forces.shape, max(map(len, places.values()), default=0)))
@@ -62,9 +61,10 @@ def _on_either_side(weight: Weight, placement: Placement, _directions: Array, si
     return np.asarray(0.5 * WRONG_SIDE * errors * sizes_mm[:, None])
 
 
-def _other_places(at: Placement, forces: Array, sizes_mm: Array, weight: Weight) -> Array:
+def _other_places(placement: Placement, row: int, forces: Array, sizes_mm: Array, weight: Weight) -> Array:
     """The sides of the legs (k, 6) where they balance too, and of each leg whose side is not known."""
-    sides = np.tile(_sides(forces), (len(EVERY), 1))
+    rows, sides = np.full(len(EVERY), row), np.tile(_sides(forces), (len(EVERY), 1))
+    at = replace(placement, poses=placement.poses[rows], joints=placement.joints[rows])
     is_balanced = (_sides_at(at, sides, EVERY, sizes_mm, weight) == EVERY).all(axis=1)
     unsure = np.abs(forces) < HARDLY_LOADED
     differ = sides != EVERY
@@ -77,10 +77,6 @@ def _sides_at(at: Placement, sides: Array, others: Array, sizes_mm: Array, weigh
     twists = 0.5 * at.by_constraints @ ((sides - others) * sizes_mm)[..., None]
     moved = replace(at, poses=apply_twist(at.poses, twists[..., 0]))
     return _sides(leg_forces(moved, weight))
-
-
-def _rows(placement: Placement, rows: NDArray[np.intp]) -> Placement:
-    return replace(placement, poses=placement.poses[rows], joints=placement.joints[rows])
 
 
 def _sides(forces: Array) -> Array:

@@ -83,10 +83,7 @@ def test_only_where_a_machine_has_another_place_and_as_far_as_that(robot, belief
         assert farthest == pytest.approx(expected, rel=0.02, abs=1e-3)
 
 
-def test_the_legs_are_those_that_hardly_anything_loads(named) -> None:
+def test_the_legs_are_those_that_hardly_anything_loads(robot, belief, task, named) -> None:
     assert {5} < {leg for one in named for leg in one.legs}
     assert all(one.apart_mm > 3.0 * PLAY_MM for one in named)
-
-
-def test_without_play_no_leg_is_named(robot, belief, task) -> None:
-    assert not places_on_either_side(robot, replace(belief, terms=None), task)
+    assert not places_on_either_side(robot, replace(belief, terms=None), task), "nothing without play"

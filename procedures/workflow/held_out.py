@@ -26,6 +26,10 @@ class HeldOutSteps:
     point_count: int
     sets: SetSteps
 
+    @property
+    def _by_chance(self) -> int:
+        return BY_CHANCE if self.sets.allowances.scatters else 0
+
     def next_step(self, state: RunState, phase: Phase) -> Step | None:
         """The next step of the first set that is not closed; None if all are."""
         for point in range(1, self.point_count + 1):
@@ -61,7 +65,7 @@ class HeldOutSteps:
         if measured.rejections and key.phase.has_new_geometry:
             if step := self._after_rejection(state, key):
                 return step
-        elif measured.rejections > (BY_CHANCE if self.sets.allowances.scatters else 0):
+        elif measured.rejections > self._by_chance:
             raise TravelError(f"{key}: the ball left the gauges' travel at a held-out pose")
         if step := self.sets.due_first(state, key, self.sets.ball_at_reference(state, key)):
             return step
@@ -96,10 +100,10 @@ class HeldOutSteps:
         """What follows when the ball has left the travel with the new geometry; None if its pose is next.
 
         A reading that could not be taken is no verdict: a gauge may have slipped. If the reference is as it
-        was, the pose is taken again, and the second time it is a verdict.
+        was, the pose is taken again, and the second time, or beyond chance, it is a verdict.
         """
         measured = state.set(key)
-        if measured.rejections > 1:
+        if measured.rejections > 1 + self._by_chance:
             back = None if measured.reference_unverified else self._back(state, key)
             return back or Judge()
         if not measured.reference_unverified:
@@ -116,7 +120,8 @@ class HeldOutSteps:
         may belong to no pose of the old geometry. One attempt is made.
         """
         measured = state.set(key)
-        if not measured.samples or measured.rejections > 2 or state.at_pose == (key, 1):
+        is_tried = measured.rejections > 2 + self._by_chance
+        if not measured.samples or is_tried or state.at_pose == (key, 1):
             return None
         try:
             return self._to_reference(state, key)

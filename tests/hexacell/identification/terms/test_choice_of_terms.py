@@ -209,12 +209,7 @@ def test_coefficients_that_no_machine_has_are_named() -> None:
 @pytest.mark.parametrize("off_mm", [(0.0, 0.0, 0.0), (40.0, 0.0, 0.0), (0.0, -40.0, 0.0)])
 def test_a_weight_that_acts_elsewhere_than_stated_is_named(off_mm: tuple[float, float, float]) -> None:
     """The sides of the legs are then others than those by the stated place."""
-    offered = tuple(
-        term
-        if term.weight is None or term.of_weight is None
-        else term.of_weight(term.weight.moved(np.array(off_mm)))
-        for term in robot().terms
-    )
+    offered = terms_of(own().robot, CENTRE_MM + off_mm)
     found = identify(replace(robot(), terms=offered).problem(measured("play")))
     named = [one.name for one in possible_causes(found) if "own_weight_centre_mm" in one.name]
     assert found.goodness.is_explained == (not any(off_mm)) == (not named)

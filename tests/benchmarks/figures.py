@@ -26,7 +26,7 @@ DID_NOT_END = "did not run to its end"
 HEAD = """# Figures of the benchmarks
 
 Written by `make figures` from `build/figures.json`, which `make bench` writes (`FULL=1`: with the samples \
-of the targets, for hours). A figure of another commit has its mark; cases with one target share a row. \
+of the targets, for hours). A figure of another commit has its mark. \
 **missed** is a target that was not reached. [Measured](measured.md) has what else was found.
 
 """
@@ -203,7 +203,7 @@ Rows = dict[tuple[str, str, str, str], list[Figure]]
 
 def _marks(commits: Iterable[str]) -> dict[str, str]:
     """A mark for the figures of each commit."""
-    return {commit: "\\*" * number for number, commit in enumerate(sorted(commits), start=1)}
+    return {commit: f"({number})" for number, commit in enumerate(sorted(commits), start=1)}
 
 
 def _joined(rows: Rows) -> Rows:

@@ -56,8 +56,8 @@ def _fate(term: TermResult, found: FoundTerms) -> str:
     if found.is_corrected(term):
         return "corrected by the controller"
     if term.name == CorrectionKind.BACKLASH:
-        return "not corrected: scatter at work"
-    return "not corrected: the geometry does as much of it as it can"
+        return "its config has no place for it: scatter at work"
+    return "its config has no place for it: the geometry does as much as it can"
 
 
 def _sentence(result: TermResult) -> str:

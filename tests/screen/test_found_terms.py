@@ -60,8 +60,8 @@ def test_what_was_found_is_said_with_its_size_and_what_corrects_it() -> None:
         "controller; play of 0.040 to 0.100 mm (one sigma 0.009), corrected by the controller."
     )
     left = found_sentence(replace(FOUND, corrections=Corrections(weight_n=100.0)))
-    assert "0.020), not corrected: scatter at work; play" in left
-    assert left.endswith("not corrected: the geometry does as much of it as it can.")
+    assert "0.020), its config has no place for it: scatter at work; play" in left
+    assert left.endswith("its config has no place for it: the geometry does as much as it can.")
     rivals = TermResult(name="play", finding=Finding.NOT_DISTINCT, log_factor=9.0, rival="compliance")
     hidden = TermResult(name="backlash", finding=Finding.NOT_SHOWN, log_factor=-3.0)
     assert "cannot be told apart from compliance; nothing is corrected" in found_sentence(

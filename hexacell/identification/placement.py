@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -92,10 +92,6 @@ class Weight:
     direction: Array
     centre_mm: Array | None = None
     beside_mm: Array = field(default_factory=lambda: np.zeros(3))
-
-    def moved(self, beside_mm: Array) -> Weight:
-        """The same weight elsewhere, by (3,) mm in the platform frame."""
-        return replace(self, beside_mm=self.beside_mm + beside_mm)
 
 
 def leg_forces(placement: Placement, weight: Weight) -> Array:

@@ -105,7 +105,7 @@ class Allowances:
 
         ``unknown`` is how far each joint (6,) may be from where it was taken to be in both together.
         """
-        ball, change = self.ball_at(reference), now - before
+        ball, change = self.ball_at(reference, before[3:]), now - before
         joints = change[3:]
         covariance = 2.0 * self._record_covariance(ball) + ball.covariance(joints)
         is_fixed = self.settings.guards.limits == "fixed"
@@ -165,10 +165,10 @@ class Allowances:
         """Covariance (3, 3), mm^2, of what the gauges show in a record, less what its encoders explain."""
         return np.asarray(self.robot.noise.record_covariance(ball.by_joints[None])[0])
 
-    def ball_at(self, reference: Pose) -> BallByEncoders:
-        """How the ball moves near a reference by what the encoders show."""
+    def ball_at(self, reference: Pose, shown: Array | None = None) -> BallByEncoders:
+        """How the ball moves near a reference by the encoders, which have ``shown`` (6,) there."""
         robot = self.robot
-        return BallByEncoders.at(robot, robot.belief(self.found), robot.from_commands([reference]))
+        return BallByEncoders.at(robot, robot.belief(self.found), robot.from_commands([reference]), shown)
 
 
 def contrasts(rows: Array) -> Array:

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.identification.belief import RobotBelief
-from hexacell.kinematics.forward import apply_twist
+from hexacell.kinematics.forward import apply_twist, forward_kinematics
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import POSITION, free_sensitivity, pose_sensitivity
@@ -41,8 +41,12 @@ class BallByEncoders:
     unknown: Array
 
     @classmethod
-    def at(cls, robot: Robot, belief: RobotBelief, command: PoseBatch) -> BallByEncoders:
-        """Near a command (1) of a robot, in the frame convention.
+    def at(
+        cls, robot: Robot, belief: RobotBelief, command: PoseBatch, shown: Array | None = None
+    ) -> BallByEncoders:
+        """Near a command (1) of a robot, in the frame convention; where its encoders show (6,) there.
+
+        Another geometry may have commanded it. Zero is no reading.
 
         Raises:
             LinAlgError: the pose is exactly at a singularity.
@@ -54,6 +58,10 @@ class BallByEncoders:
         else:  # the robot as drawn cannot be there, and yet it is: nearly at the command
             poses = command
             joints = mechanism.inverse(belief.controller, belief.branch, command)
+        if shown is not None and shown.any():
+            solved = forward_kinematics(mechanism, geometry, shown[None], poses)
+            if solved.found[0]:
+                poses, joints = solved.poses, shown[None]
         whole = pose_sensitivity(mechanism, geometry, poses, joints).joints[0]
         steps = STEP_MM / np.linalg.norm(whole[:3], axis=0)
         moved = np.concatenate([np.diag(steps), -np.diag(steps)])

@@ -55,9 +55,9 @@ def _fate(term: TermResult, found: FoundTerms) -> str:
     """What becomes of a term."""
     if found.is_corrected(term):
         return "corrected by the controller"
-    if term.name == CorrectionKind.BACKLASH:
-        return "its config has no place for it: scatter at work"
-    return "its config has no place for it: the geometry does as much as it can"
+    is_backlash = term.name == CorrectionKind.BACKLASH
+    rest = "scatter at work" if is_backlash else "the geometry does as much as it can"
+    return f"its config has no place for it: {rest}"
 
 
 def _sentence(result: TermResult) -> str:

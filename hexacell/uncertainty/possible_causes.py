@@ -15,7 +15,7 @@ Sources: Rao 1948 (score test); Theil 1961 (adjusted coefficient of determinatio
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -119,15 +119,14 @@ def _weight_elsewhere(test: ExcessTest) -> Iterator[PossibleCause]:
             continue
         stated, unknowns = test.gain(term.pose_errors(placement, problem.directions)[:, :3])
         for beside in radius * BESIDE:
-            moved = term.of_weight(term.weight.moved(beside))
+            moved = term.of_weight(replace(term.weight, beside_mm=beside))
             gain, _ = test.gain(moved.pose_errors(placement, problem.directions)[:, :3])
             if gain - stated > max(best, significant * max(1.0, test.found.noise_test.ratio) ** 2):
                 best, likely = gain - stated, (beside, test.share_of_gain(gain, unknowns + 2))
     if likely is not None:
         (x, y, _), share = likely
-        yield PossibleCause(
-            f"a weight that acts some {x:+.0f} mm in x, {y:+.0f} mm in y from own_weight_centre_mm", share
-        )
+        where = f"some {x:+.0f} mm in x, {y:+.0f} mm in y from own_weight_centre_mm"
+        yield PossibleCause(f"a weight that acts {where}", share)
 
 
 def _lost_place(test: ExcessTest) -> Iterator[PossibleCause]:

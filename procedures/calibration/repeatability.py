@@ -72,7 +72,7 @@ def _gauges_and_joints(reading: Reading, reference: Pose, allowances: Allowances
         joints = joints - further
         if allowances.terms is not None:
             beside = allowances.terms.beside_encoders(directions)
-            gauges = gauges - allowances.ball_at(reference).motion(beside + further)
+            gauges = gauges - allowances.ball_at(reference, joints).motion(beside + further)
     return np.array([*gauges, *joints])
 
 
@@ -138,9 +138,10 @@ def reversal_by_repeats(plan: Plan, state: RunState, found: Identification) -> R
         known = [reading for reading in readings if reading.directions and all(reading.directions)]
         rows = np.array([[*one.gauges_mm, *one.joints, *one.directions] for one in known])
         reference = Pose(*one.samples[0].pose)
-        ball = allowances.ball_at(reference)
+        before = np.array([0.0, 0.0, 0.0, *one.samples[0].reading.joints])
+        ball = allowances.ball_at(reference, before[3:])
         for row in contrasts(rows):
-            change = allowances.since(reference, np.zeros(9), row[:9])
+            change = allowances.since(reference, before, before + row[:9])
             visits.append(Revisit(change, ball.by_joints, row[9:]))
     stated, unit = plan.settings.model.backlash, plan.settings.mechanism.words.joint_unit
     if found.terms is not None and BACKLASH in {term.name for term in found.terms.terms}:

@@ -120,8 +120,7 @@ class HeldOutSteps:
         may belong to no pose of the old geometry. One attempt is made.
         """
         measured = state.set(key)
-        is_tried = measured.rejections > 2 + self._by_chance
-        if not measured.samples or is_tried or state.at_pose == (key, 1):
+        if not measured.samples or measured.rejections > 2 + self._by_chance or state.at_pose == (key, 1):
             return None
         try:
             return self._to_reference(state, key)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -63,3 +65,16 @@ def test_the_reference_of_another_robot_is_no_drift(bundled_cell, robot) -> None
         assert not found.exceeds(0.1)
     slipped = allowances.since(REFERENCE, np.zeros(9), after + np.eye(9)[1])
     assert slipped.exceeds(0.1)
+
+
+def test_it_is_there_where_the_encoders_show_it_whatever_commanded_it(robot) -> None:
+    """While points are measured a provisional geometry may command, and bring the ball elsewhere."""
+    [truth] = drawn(robot, 1, seed=3)
+    provisional = robot.with_controller(robot.for_controller(truth))
+    known = replace(robot.belief(), free=robot.mechanism.convention.free_parameters(truth))
+    changes = 0.1 * np.random.default_rng(7).standard_normal((20, 6))
+    really = moved(provisional, truth, changes)
+    joints = robot.mechanism.inverse(truth, robot.branch, provisional.from_commands([REFERENCE]))[0]
+    for shown, is_known in ((joints, True), (None, False)):
+        ball = BallByEncoders.at(robot, known, robot.from_commands([REFERENCE]), shown)
+        assert (np.abs(ball.motion(changes) - really).max() < 0.01) == is_known

@@ -19,8 +19,7 @@ from hexacell.robot.model import Robot, robot_of
 from hexacell.verdict.either_side import places_on_either_side
 from tests.benchmarks.machines import bundled, truth_of
 
-PLAY_MM, CENTRE_MM = 0.2, (5.0, -3.0, 20.0)
-DOWN = np.array([0.0, 0.0, -1.0])
+PLAY_MM, CENTRE_MM, DOWN = 0.2, (5.0, -3.0, 20.0), np.array([0.0, 0.0, -1.0])
 
 
 @pytest.fixture(scope="module")
@@ -30,9 +29,8 @@ def robot() -> Robot:
 
 @pytest.fixture(scope="module")
 def belief(robot: Robot) -> RobotBelief:
-    """The robot of Table 1 with play that its controller knows."""
-    truth = truth_of(bundled(), robot, 0)
-    down = robot.mechanism.normalize_frames(robot.drawing)[1].base @ DOWN
+    truth, frames = truth_of(bundled(), robot, 0), robot.mechanism.normalize_frames(robot.drawing)[1]
+    down = frames.base @ DOWN
     term = play(0.1, Weight(down, np.array(CENTRE_MM))).identified_as(np.full(6, PLAY_MM), np.full(6, 0.01))
     free = robot.mechanism.convention.free_parameters(truth)
     return replace(robot.belief(), free=free, terms=TermEstimates.expected((term,), len(free)))

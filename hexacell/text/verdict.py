@@ -80,10 +80,10 @@ def _either_side(places: Sequence[EitherSide]) -> str:
     others = f" So at {counted(more, 'other task pose')}." if more else ""
     legs = "leg" if len(worst.legs) == 1 else "legs"
     return (
-        f"at the task pose {Pose(*worst.pose)} the weight hardly loads {legs} "
-        f"{', '.join(map(str, worst.legs))}: on the other side of the play the ball is "
-        f"{shown(worst.apart_mm)} away. No controller corrects that: load what hardly is, take up the "
-        f"play, or change the pose.{others}"
+        f"at the task pose {Pose(*worst.pose)} the weight may as well lay {legs} "
+        f"{', '.join(map(str, worst.legs))} on the other side of the play, with the ball "
+        f"{shown(worst.apart_mm)} away. No controller corrects that: load the leg that hardly is, take up "
+        f"its play, or change the pose.{others}"
     )
 
 

@@ -61,10 +61,9 @@ WAVELENGTHS_MM = (600.0, 1500.0)
 """Waves of the rails that are longer than the travel of a slider at one point."""
 
 
-AROUND = np.arange(8) * np.pi / 4
-BESIDE = np.concatenate(
-    [share * np.stack([np.cos(AROUND), np.sin(AROUND), 0.0 * AROUND], axis=-1) for share in (0.1, 0.3, 0.6)]
-)
+TURNS = np.arange(8) * np.pi / 4
+AROUND = np.stack([np.cos(TURNS), np.sin(TURNS), np.zeros(8)], axis=-1)
+BESIDE = np.concatenate([share * AROUND for share in (0.1, 0.3, 0.6)])
 """Where a weight may act instead, (k, 3) by the radius of the platform."""
 
 

@@ -205,9 +205,16 @@ def verified_accuracy(
     errors = budget.errors_of(difference)
     of_geometry = budget.errors_of(difference, of_geometry=True) if budget.scatters else None
     alone = errors_of_geometry_alone(settings, robot, updated)
-    given = {"of_geometry": of_geometry, "alone": alone}
-    places = places_on_either_side(robot, belief, task)
-    return VerifiedAccuracy.of(errors, settings, robot, task, **given, length=length, either_side=places)
+    return VerifiedAccuracy.of(
+        errors,
+        settings,
+        robot,
+        task,
+        of_geometry=of_geometry,
+        alone=alone,
+        length=length,
+        either_side=places_on_either_side(robot, belief, task),
+    )
 
 
 def _noise_in_mm(robot: Robot, updated: Identification) -> Noise:

@@ -28,6 +28,7 @@ class HeldOutSteps:
 
     @property
     def _by_chance(self) -> int:
+        """Rejected poses of a set that prove nothing."""
         return BY_CHANCE if self.sets.allowances.scatters else 0
 
     def next_step(self, state: RunState, phase: Phase) -> Step | None:

@@ -98,7 +98,7 @@ def test_no_line_of_a_verdict_is_wider_than_a_terminal(value, expanded, limit, v
     told = event_text(events.ResultValidated(verdict=verdict, line="", verification=verified), RunState())
     assert told is not None
     assert max(map(len, told.splitlines())) <= COLUMNS
-    named = "X0.000 Y-50.000 Z450.000 A0.000 B0.000 C-20.000 the weight hardly loads legs 2, 5"
+    named = "X0.000 Y-50.000 Z450.000 A0.000 B0.000 C-20.000 the weight may as well lay legs 2, 5"
     assert all(words in " ".join(told.split()) for words in (named, "So at 1 other task pose."))
 
 

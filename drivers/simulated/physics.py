@@ -210,7 +210,8 @@ class RobotPhysics:
                 action="Correct [simulation.geometry], or start at another point",
             )
         self._machine = LoadedMachine(mechanism, self._truth, settings)
-        self._start_s = clock.now()
+        self._start_s = self._walked_s = clock.now()
+        self._random_walk, self._walked_mm = np.random.default_rng([settings.seed, 3]), np.zeros(3)
         gaps, of_its_own = np.array(settings.joints.backlash), np.random.default_rng([settings.seed, 2])
         self._backlash = Backlash(gaps, joints[0], of_its_own)
         self._pose, self._joints, self._warmer_k = first.poses, np.full(6, np.nan), 0.0
@@ -271,11 +272,17 @@ class RobotPhysics:
             if now >= self._motion.end_s:
                 ball = ball + self._ringing(now - self._motion.end_s)
                 self.gauges.follow(ball)
-            displacement = self.gauges.triad @ (ball - self.gauges.station) + self._gauge_noise
+            displacement = (
+                self.gauges.triad @ (ball - self.gauges.station) + self._gauge_noise + self._walked_mm
+            )
             flicker = self._settings.gauges.flicker_mm * self._random.standard_normal()
             return float(displacement[AXES.index(axis)] + flicker)
 
     def _draw_noise(self) -> None:
+        """Of the next stop; the mounts of the gauges have drifted since the last one."""
+        minutes, self._walked_s = (self._clock.now() - self._walked_s) / 60.0, self._clock.now()
+        step_mm = 1e-3 * self._settings.gauges.drift_um * np.sqrt(max(0.0, minutes))
+        self._walked_mm = self._walked_mm + step_mm * self._random_walk.standard_normal(3)
         self._ringing_direction = self._random.standard_normal(3)
         self._gauge_noise = self._settings.gauges.noise_mm * self._random.standard_normal(3)
         self._encoder_noise = self._settings.encoders.noise * self._random.standard_normal(6)

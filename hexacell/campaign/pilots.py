@@ -21,6 +21,9 @@ from hexacell.measurements.records import MeasurementSet, Record
 FIRST_PILOT = MOST_POSES + 1
 """Orientation number of the first pilot pose, which no record has."""
 
+FIRST_REPEAT = 2 * MOST_POSES + 1
+"""Orientation number of the first reading of a reference that counts as a record, as the gauges drift."""
+
 CAUTION = 3.0
 """Factor by which the noise may exceed what is stated while pilot poses are chosen."""
 

@@ -71,6 +71,9 @@ class SimulatedGauges(Section):
     off_middle_mm: tuple[InRange, InRange, InRange] = key(
         (0.0, 0.0, 0.0), "constant distance of the ball from mid-travel along x, y, z beside that, mm"
     )
+    drift_um: NotNegative = key(
+        0.0, "random walk of their mounts along each axis in a minute of cell time, um, 1 sigma"
+    )
 
 
 class SimulatedEncoders(Section):

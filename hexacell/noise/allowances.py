@@ -99,17 +99,18 @@ class Allowances:
         return max(stated, room / float(np.linalg.norm(ball.by_joints, axis=0).max()))
 
     def since(
-        self, reference: Pose, before: Array, now: Array, unknown: Array | None = None
+        self, reference: Pose, before: Array, now: Array, unknown: Array | None = None, readings: int = 0
     ) -> ReferenceChange:
         """The change of two readings (9,) at one reference: gauges x, y, z, mm, then the encoders.
 
-        ``unknown`` is how far each joint (6,) may be from where it was taken to be in both together.
+        ``unknown`` is how far each joint (6,) may be from where it was taken to be in both together. The
+        second one is so many ``readings`` later, between which the gauges drift as is known of them.
         """
         ball, change = self.ball_at(reference, before[3:]), now - before
         joints = change[3:]
         covariance = 2.0 * self._record_covariance(ball) + ball.covariance(joints)
         is_fixed = self.settings.guards.limits == "fixed"
-        explicable = SIGMAS * np.sqrt(np.diag(covariance))
+        explicable = SIGMAS * np.sqrt(np.diag(covariance) + readings * self.robot.noise.walk_mm**2)
         if unknown is not None:
             explicable = explicable + np.abs(ball.by_joints) @ unknown
         return ReferenceChange(
@@ -119,6 +120,7 @@ class Allowances:
             explicable_mm=np.zeros(3) if is_fixed else explicable,
             joints=joints,
             explicable_joints=0.0 if is_fixed else float(np.sqrt(2.0)) * self.stop_sigmas * self.stops,
+            readings=readings,
         )
 
     def between_visits(self, reference: Pose, visits: Array) -> tuple[ReferenceChange, ...]:
@@ -189,6 +191,7 @@ class ReferenceChange:
         explicable_mm: (3,) up to which these explain it.
         joints: (6,) of the encoders.
         explicable_joints: up to which the scatter of the stops explains these.
+        readings: how many later the second one is; 0 of visits one after the other.
     """
 
     unexplained_mm: Array
@@ -197,6 +200,7 @@ class ReferenceChange:
     explicable_mm: Array
     joints: Array
     explicable_joints: float
+    readings: int = 0
 
     def exceeds(self, limit_mm: float) -> bool:
         """Whether a gauge shows more than a limit, and more than is explicable."""

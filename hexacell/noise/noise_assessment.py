@@ -75,13 +75,18 @@ def visits_agree(plan: Plan, readings: NoiseReadings) -> bool:
 
 
 def assess_again(
-    plan: Plan, readings: NoiseReadings, measured: MeasuredNoise, found: Identification
+    plan: Plan,
+    readings: NoiseReadings,
+    measured: MeasuredNoise,
+    found: Identification,
+    drifted_mm: float = 0.0,
 ) -> MeasuredNoise:
     """The noise by the same readings, once the geometry is known by which the encoders move the ball.
 
-    Near a singularity the drawing may be wrong by half in that. The records were taken as ``measured``.
+    Near a singularity the drawing may be wrong by half in that. The records were taken as ``measured``. By
+    the visits gauges are known to have ``drifted_mm`` about their mean, which is no noise.
     """
-    again = _NoiseAssessment(plan, readings, found)
+    again = _NoiseAssessment(plan, readings, found, drifted_mm)
     x, y, z, *encoders = again.instruments(measured.windows)
     update = {"gauges": (x, y, z), "encoders": tuple(encoders), "approaches": again.scatter}
     return measured.model_copy(update=update)
@@ -94,6 +99,7 @@ class _NoiseAssessment:
     plan: Plan
     readings: NoiseReadings
     found: Identification | None = None
+    drifted_mm: float = 0.0
 
     def result(self) -> MeasuredNoise:
         by_windows = {windows: self._of_records(windows) for windows in WINDOWS}
@@ -135,7 +141,8 @@ class _NoiseAssessment:
         command = robot.from_commands([self.readings.reference])
         ball = BallByEncoders.at(robot, robot.belief(self.found), command)
         unit = robot.mechanism.words.joint_unit
-        found = approach_scatter(visits[:, :3], visits[:, 3:], ball, least[3:], least[:3], unit)
+        gauges = np.hypot(least[:3], self.drifted_mm)
+        found = approach_scatter(visits[:, :3], visits[:, 3:], ball, least[3:], gauges, unit)
         if self.found is not None and found is not None and found.source is ScatterSource.JOINTS:
             # How large it is, all repeats of a run say together, see :mod:`.repeats`.
             return found.model_copy(update={"source": None, "excess": 0.0})

@@ -5,7 +5,8 @@ more: what the encoders do not explain of the change is the noise of two reading
 estimate of pure error, which is compared with the noise V that the run counts with.
 
 What is more may be of all readings, ``f^2 V``, or of joints that stop beside what their encoders show,
-``V + x^2 G G^T``: the one with the larger likelihood counts.
+``V + x^2 G G^T``: the one with the larger likelihood counts. Where only readings that are far apart in time
+differ more, the gauges drift: after n readings by ``V + s^2 n I``, a random walk.
 
 Source: Draper and Smith, Applied Regression Analysis, 3rd ed. 1998, chapter 2 (pure error).
 """
@@ -23,7 +24,7 @@ from hexacell.identification.problem.prior import Noise
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.parameters import LEGS
-from hexacell.kinematics.rotations import Array
+from hexacell.kinematics.rotations import Array, Mask
 from hexacell.noise.allowances import ReferenceChange
 from hexacell.noise.approach_scatter import RepeatedApproaches
 from hexacell.robot.model import Robot
@@ -42,6 +43,12 @@ LIKELY = 0.003
 """Probability likewise, of the repeats and of the residuals of the fit together, below which stops that no
 encoder sees count at work. The residuals are many, so that few machines have them and are not noticed."""
 
+DRIFTS = 0.01
+"""Probability of the changes at the ends of sets, by noise alone, below which they may be of a drift."""
+
+FEWEST_SETS = 2
+"""One set that does not close may be of a gauge that slipped."""
+
 FEWEST = 5.0
 """Degrees of freedom that a size has at least: the likelihood of a small one has no peak to tell them."""
 
@@ -51,8 +58,8 @@ SIZES = np.geomspace(1e-2, 1e3, 400)
 
 
 @dataclass(frozen=True, slots=True)
-class UnseenStops:
-    """Where joints stop beside what their encoders show, one standard deviation, and how well it is known.
+class MoreScatter:
+    """Scatter of one kind beside the noise, one standard deviation, and how well it is known.
 
     ``better`` is the logarithm of their likelihood, less that of noise of all readings.
     """
@@ -71,12 +78,14 @@ class Repeats:
         is_measured: whether that noise was measured by some of them, not stated.
         seen_freedom: degrees of freedom of the stops that the encoders show.
         residuals: of a fit with that noise; None without one.
+        walk_mm: the drift from one reading to the next that it has.
     """
 
     changes: tuple[ReferenceChange, ...]
     is_measured: bool = False
     seen_freedom: float = np.inf
     residuals: ChiSquareTest | None = None
+    walk_mm: float = 0.0
 
     @classmethod
     def of(
@@ -90,7 +99,8 @@ class Repeats:
         seen = np.inf if approaches is None else float(LEGS * (approaches.visits - 1))
         is_measured = approaches is not None and approaches.source is not None
         is_of_fit = found is not None and found.problem.noise.encoder <= noise.encoder * (1.0 + 1e-6)
-        return cls(tuple(changes), is_measured, seen, found.goodness if found and is_of_fit else None)
+        goodness = found.goodness if found and is_of_fit else None
+        return cls(tuple(changes), is_measured, seen, goodness, noise.walk_mm)
 
     @property
     def freedom(self) -> float:
@@ -115,16 +125,47 @@ class Repeats:
             return replace(noise, freedom=stops.freedom)
         return replace(noise.scaled(self._factor), freedom=self.freedom)
 
-    def unseen_stops(self, noise: Noise) -> UnseenStops:
+    def unseen_stops(self, noise: Noise) -> MoreScatter:
         """Where joints stop beside what their encoders show, as far as the ``noise`` has no room for it.
 
         It counts at work even where noise of all readings explains the changes better: that is the worst.
         """
         is_likely = self.residuals is not None and self._is_larger(LIKELY, self.residuals)
         if not (is_likely or self._is_larger(SIGNIFICANCE)):
-            return UnseenStops(0.0, self.freedom, 0.0)
-        sizes, stops = noise.encoder * SIZES, np.stack([one.by_stops for one in self.changes])
-        covariances = self._covariances + (sizes**2)[:, None, None, None] * stops
+            return MoreScatter(0.0, self.freedom, 0.0)
+        return self._likeliest(noise.encoder * SIZES, np.stack([one.by_stops for one in self.changes]))
+
+    def show_drift(self, noise: Noise) -> bool:
+        """Whether the ends of sets, and visits in short order, show a drift better than other scatter."""
+        ends = self._ends
+        if ends.all() or ends.sum() < FEWEST_SETS:
+            return False
+        shown, covariances = self._shown[ends], self._covariances[ends]
+        chi2 = float(np.sum(shown * np.linalg.solve(covariances, shown[..., None])[..., 0]))
+        if chi_square_exceedance(3.0 * float(ends.sum()), chi2) >= DRIFTS:
+            return False
+        stops = self._likeliest(noise.encoder * SIZES, np.stack([one.by_stops for one in self.changes]))
+        return self._walk.better > max(0.0, stops.better)
+
+    @property
+    def drift_mm(self) -> float:
+        """How far gauges drift along each axis from one reading to the next, one standard deviation."""
+        ends = np.flatnonzero(self._ends)
+        return replace(self, changes=tuple(self.changes[row] for row in ends))._walk.size
+
+    @property
+    def _ends(self) -> Mask:
+        return np.array([one.readings > 0 for one in self.changes])
+
+    @property
+    def _walk(self) -> MoreScatter:
+        readings = np.array([one.readings for one in self.changes])
+        unit = float(np.sqrt(np.mean(np.trace(self._covariances, axis1=1, axis2=2)) / 3.0))
+        return self._likeliest(unit * SIZES, readings[:, None, None] * np.eye(3))
+
+    def _likeliest(self, sizes: Array, squares: Array) -> MoreScatter:
+        """The likeliest of sizes (s,) by what the square of one does to each change (n, 3, 3), mm^2."""
+        covariances = self._covariances + (sizes**2)[:, None, None, None] * squares
         inverses = np.linalg.inv(covariances)
         misfit = np.einsum("ni,snij,nj->s", self._shown, inverses, self._shown)
         costs = misfit + np.linalg.slogdet(covariances)[1].sum(axis=-1)
@@ -133,9 +174,9 @@ class Repeats:
             2.0 * np.log(self._factor) + 1.0
         )
         better = 0.5 * float(of_all - costs[best])
-        weighted = sizes[best] ** 2 * (inverses[best] @ stops)
+        weighted = sizes[best] ** 2 * (inverses[best] @ squares)
         freedom = float(np.einsum("nij,nji->", weighted, weighted))
-        return UnseenStops(float(sizes[best]), max(freedom, FEWEST), better)
+        return MoreScatter(float(sizes[best]), max(freedom, FEWEST), better)
 
     def applied_to_robot(self, robot: Robot) -> Robot:
         """The robot with that noise, and with what its stops do at work."""
@@ -159,4 +200,5 @@ class Repeats:
 
     @cached_property
     def _covariances(self) -> Array:
-        return np.stack([one.covariance for one in self.changes])
+        by_drift = np.array([one.readings * self.walk_mm**2 for one in self.changes])
+        return np.stack([one.covariance for one in self.changes]) + by_drift[:, None, None] * np.eye(3)

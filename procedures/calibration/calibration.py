@@ -88,6 +88,7 @@ class Calibration:
             None if proposed is None else tuple(vector(proposed.written).tolist()),
             None if proposed is None else proposed.corrections,
             state.committed is not None,
+            state.walk_mm,
         )
 
     @cached_property
@@ -141,6 +142,7 @@ class Knowledge:
             mechanism's frame convention; ``is_lent``: it has it now.
         written: parameters of the proposed geometry, in the controller's frames, with the ``corrections``
             that are proposed beside it; ``is_committed``: the controller has it.
+        walk_mm: how far the gauges drift from one reading to the next.
     """
 
     calibration: Calibration
@@ -151,6 +153,7 @@ class Knowledge:
     written: tuple[float, ...] | None = None
     corrections: Corrections | None = None
     is_committed: bool = False
+    walk_mm: float = 0.0
 
     @cached_property
     def settings(self) -> CellSettings:
@@ -162,7 +165,8 @@ class Knowledge:
     def robot(self) -> Robot:
         """The robot as its controller commanded it at the start, with the measured noise."""
         robot = replace(self.calibration.robot, refused=self.refused)
-        return robot if self.noise is None else robot.with_errors_of(self.settings)
+        robot = robot if self.noise is None else robot.with_errors_of(self.settings)
+        return replace(robot, noise=replace(robot.noise, walk_mm=self.walk_mm))
 
     @cached_property
     def plan(self) -> Plan:
@@ -257,6 +261,7 @@ class Knowledge:
         robot = self._at_temperatures(robot, settings, state.temperature_range_k)
         if noise is None:
             return robot
+        robot = replace(robot, noise=replace(robot.noise, walk_mm=self.walk_mm))
         identifying = replace(self.identifying.robot, noise=robot.noise)
         allowances = Allowances(self.calibration.settings, identifying, is_measured=True, found=found)
         changes = repeated_readings(state, self.calibration.plan, allowances)

@@ -5,6 +5,7 @@ before the geometry is identified, and well afterwards: the same readings then s
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from hexacell.kinematics.rotations import Array
 from hexacell.noise.allowances import Allowances, ReferenceChange, contrasts
 from hexacell.noise.measured_noise import MeasuredNoise
 from hexacell.noise.noise_assessment import NoiseReadings, assess_again
+from hexacell.noise.repeats import Repeats
 from hexacell.noise.reversal import Reversal, Revisit, reversal_of
 from hexacell.noise.standstill import display_step
 from procedures.run.keys import Phase
@@ -82,7 +84,7 @@ def since_zero(allowances: Allowances, measured: SetState, now: Reading) -> Refe
     reference = Pose(*zero.pose)
     before, after = (_gauges_and_joints(one, reference, allowances) for one in (zero.reading, now))
     unknown = _on_unknown_sides(zero.reading, allowances) + _on_unknown_sides(now, allowances)
-    return allowances.since(reference, before, after, unknown)
+    return allowances.since(reference, before, after, unknown, measured.readings)
 
 
 def _on_unknown_sides(reading: Reading, allowances: Allowances) -> Array:
@@ -94,8 +96,12 @@ def _on_unknown_sides(reading: Reading, allowances: Allowances) -> Array:
 
 
 def repeated_readings(state: RunState, plan: Plan, allowances: Allowances) -> Iterator[ReferenceChange]:
-    """At visits of the first reference, and at the end of each set before the geometry is identified."""
-    if (visits := _visits(plan, state, allowances)) is not None:
+    """At visits of the first reference, and at the end of each set before the geometry is identified.
+
+    Where gauges are known to drift, the visits are left out: how far they did then is not in their changes.
+    """
+    is_drifting = allowances.robot.noise.walk_mm > 0.0
+    if not is_drifting and (visits := _visits(plan, state, allowances)) is not None:
         yield from allowances.between_visits(visits.reference, visits.visits)
     for key, one in state.sets.items():
         if key.phase is not Phase.IDENTIFY or not one.samples or one.closing is None:
@@ -104,12 +110,30 @@ def repeated_readings(state: RunState, plan: Plan, allowances: Allowances) -> It
             yield since_zero(allowances, one, one.closing)
 
 
+def drift_by_repeats(plan: Plan, state: RunState, allowances: Allowances) -> float:
+    """How far the gauges drift from one reading to the next, mm (1 sigma); 0 unless significant.
+
+    What was measured of the noise contains the drift between the visits: what is stated does not.
+    """
+    measured, stated = (
+        replace(allowances, robot=replace(allowances.robot, noise=replace(noise, walk_mm=0.0)))
+        for noise in (allowances.robot.noise, plan.robot.noise)
+    )
+    changes = tuple(repeated_readings(state, plan, measured))
+    if not Repeats(changes).show_drift(measured.robot.noise):
+        return 0.0
+    return Repeats(tuple(repeated_readings(state, plan, stated))).drift_mm
+
+
 def noise_again(plan: Plan, state: RunState, found: Identification) -> MeasuredNoise | None:
     """The measured noise by the visits, with the geometry that was identified; None without."""
     allowances = Allowances(plan.settings, plan.robot, is_measured=True, found=found)
     if state.noise is None or (visits := _visits(plan, state, allowances)) is None:
         return None
-    return assess_again(plan, visits, state.noise.noise, found)
+    visited = state.set(state.noise.at)
+    # A random walk of n steps varies about its mean by a sixth of n.
+    steps = (len(visited.visits) + len(visited.pilots)) / 6.0
+    return assess_again(plan, visits, state.noise.noise, found, state.walk_mm * float(np.sqrt(steps)))
 
 
 def _visits(plan: Plan, state: RunState, allowances: Allowances) -> NoiseReadings | None:

@@ -5,15 +5,18 @@ What an event changes is in its own file (:mod:`procedures.steps`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import numpy as np
+
+from hexacell.campaign.pilots import FIRST_REPEAT
 from hexacell.cell.recovery import FailureKind
 from hexacell.kinematics.commanded_motion import RefusedCommand, RefusedCommands
 from hexacell.kinematics.corrections import NO_CORRECTIONS
-from hexacell.measurements.records import Directions, MeasurementSet, Record
+from hexacell.measurements.records import Directions, MeasurementSet, Record, deviation_of
 from hexacell.results.term_result import FoundTerms
 from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
 from procedures.run.readings import Reading
@@ -48,6 +51,7 @@ class SetState:
         samples: those that count, in the order taken; the first is the reference.
         again: orientations and poses of discarded records, which are taken again.
         closing: what was read at the reference at the end.
+        walk_mm: how far the gauges drift from one reading to the next, by all sets until then.
         reference_unverified: the gauges were unwatched; their zero must be verified at the reference.
         standstill: readings at the reference without moving, and ``visits`` of it.
         has_left: the robot has been elsewhere since it was read last.
@@ -62,6 +66,7 @@ class SetState:
     rejections: int = 0
     drift_mm: tuple[float, float, float] | None = None
     closing: Reading | None = None
+    walk_mm: float = 0.0
     again: tuple[tuple[int, SixNumbers], ...] = ()
     reference_unverified: bool = False
     standstill: StandstillRead | None = None
@@ -78,6 +83,11 @@ class SetState:
         return self.drift_mm is not None
 
     @property
+    def readings(self) -> int:
+        """How many readings were taken until now, from which a drift is counted."""
+        return sum(map(len, (self.samples, self.visits, self.pilots, self.probes)))
+
+    @property
     def next_orientation(self) -> int:
         """The lowest orientation without a record."""
         taken = {sample.orientation for sample in self.samples}
@@ -87,6 +97,26 @@ class SetState:
         """The pose of a record taken or to be taken again; None if it is not decided."""
         found = [sample.pose for sample in self.samples if sample.orientation == orientation]
         return found[0] if found else dict(self.again).get(orientation)
+
+    def with_repeats(self, visits: Sequence[Reading]) -> Iterator[Record]:
+        """Its records, and readings of its reference as others: ``visits`` after the first, and the last.
+
+        They are in the order taken, so that they show the way of a drift.
+        """
+        first, *others = self.samples
+        closing = () if self.closing is None else (self.closing,)
+        repeats = [
+            replace(
+                first.record,
+                orientation=FIRST_REPEAT + number,
+                joints=reading.joints,
+                deviation=deviation_of(np.subtract(reading.gauges_mm, first.reading.gauges_mm)),
+                directions=reading.directions,
+            )
+            for number, reading in enumerate((*visits, *closing))
+        ]
+        taken = (sample.record for sample in others)
+        yield from (first.record, *repeats[: len(visits)], *taken, *repeats[len(visits) :])
 
     def unverified(self) -> SetState:
         """The set after the gauges were unwatched; a closed set is not affected."""
@@ -251,8 +281,26 @@ class RunState:
         return tuple(sample for key in keys for sample in self.sets[key].samples)
 
     def measurements(self) -> MeasurementSet:
-        """The records that the geometry is identified from."""
-        return MeasurementSet(tuple(sample.record for sample in self.samples(Phase.IDENTIFY)))
+        """The records that the geometry is identified from; where gauges drift, with references again."""
+        if not self.walk_mm:
+            return MeasurementSet(tuple(sample.record for sample in self.samples(Phase.IDENTIFY)))
+        keys = sorted((key for key in self.sets if key.phase is Phase.IDENTIFY), key=lambda key: key.point)
+        measured = [(key, self.sets[key]) for key in keys if self.sets[key].samples]
+        return MeasurementSet(
+            tuple(record for key, one in measured for record in one.with_repeats(self._visits_of(key)))
+        )
+
+    @property
+    def walk_mm(self) -> float:
+        """How far the gauges drift from one reading to the next, mm (1 sigma); 0 unless significant."""
+        sets = self.sets.items()
+        closed = [one.walk_mm for key, one in sets if key.phase is Phase.IDENTIFY and one.closed]
+        return closed[-1] if closed else 0.0
+
+    def _visits_of(self, key: SetKey) -> tuple[Reading, ...]:
+        """The visits of a set's reference after its first record, if that was not taken again then."""
+        is_kept = self.noise is not None and self.noise.at == key and self.noise.noise.windows == 1
+        return tuple(visit.reading for visit in self.set(key).visits) if is_kept else ()
 
     @property
     def pilots(self) -> tuple[Record, ...]:

@@ -7,28 +7,37 @@ import numpy as np
 from hexacell.lengths import unit_of
 from hexacell.measurements.records import deviation_of
 from hexacell.noise.allowances import ReferenceChange
+from procedures.calibration.repeatability import drift_by_repeats
 from procedures.resources.run_resources import RunResources
-from procedures.run.keys import ThreeNumbers
+from procedures.run.keys import Phase, ThreeNumbers
 from procedures.run.readings import Reading, in_words
 from procedures.run.state import RunState
 from procedures.run.trips import Guard, Trip
 from procedures.steps.base import EventOfSet, StepOfSet
+
+DRIFTS = (
+    "\nthe gauges drift, by {um:.1f} um (one sigma) from one reading to the next, beyond noise; records "
+    "are weighted by that, with references read again as records. Look for draught, lamps, loose mounts"
+)
 
 
 class SetClosed(EventOfSet):
     """The reference was read again.
 
     ``drift_mm`` is the change of the gauges since they were zeroed, less what the encoders explain. The
-    ``reason`` is why the set has fewer records than planned; empty where it has all.
+    ``reason`` is why the set has fewer records than planned; empty where it has all. ``walk_mm`` is how far
+    the gauges drift from one reading to the next (1 sigma), by the ends of all sets; 0 unless significant.
     """
 
     kind: Literal["closed"] = "closed"
     drift_mm: ThreeNumbers
     reading: Reading
     reason: str = ""
+    walk_mm: float = 0.0
 
     def applied_to(self, state: RunState) -> RunState:
-        return state.with_changed_set(self.at, drift_mm=self.drift_mm, closing=self.reading)
+        read = {"drift_mm": self.drift_mm, "closing": self.reading, "walk_mm": self.walk_mm}
+        return state.with_changed_set(self.at, **read)
 
     def text(self, state: RunState) -> str:
         samples = state.set(self.at).samples
@@ -36,6 +45,8 @@ class SetClosed(EventOfSet):
         drift = float(np.abs(self.drift_mm).max())
         unit = unit_of(largest, drift)
         end = f"\n{self.at.name} ends with {len(samples)} records: {self.reason}" if self.reason else ""
+        if self.walk_mm and sum(one.walk_mm > 0.0 for one in state.sets.values()) == 1:
+            end += DRIFTS.format(um=1e3 * self.walk_mm)
         return (
             f"{self.at.name:24} {len(samples):2} records, "
             f"largest deviation {unit.length(largest)}, drift {unit.length(drift)}{end}"
@@ -62,7 +73,12 @@ class CloseSet(StepOfSet):
         if trip := reference_drift(str(self.at), change, run.settings.acceptance.drift_mm):
             raise trip.as_error()  # not latched, as nothing moved
         drift_mm = deviation_of(change.unexplained_mm)
-        return SetClosed(at=self.at, drift_mm=drift_mm, reading=reading, reason=self.reason)
+        closed = SetClosed(at=self.at, drift_mm=drift_mm, reading=reading, reason=self.reason)
+        walk_mm = state.walk_mm
+        if self.at.phase is Phase.IDENTIFY:
+            after, known = closed.applied_to(state), run.calibration.known(state)
+            walk_mm = drift_by_repeats(run.calibration.plan, after, known.allowances)
+        return closed.model_copy(update={"walk_mm": walk_mm})
 
 
 def reference_drift(point: str, change: ReferenceChange, limit_mm: float) -> Trip | None:

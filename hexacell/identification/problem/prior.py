@@ -34,6 +34,8 @@ class Noise:
         gauge_shares: of each gauge, x, y, z, in units of ``gauge_mm``.
         stops: of where a joint stops beside its command, as its encoder shows it: no noise of a record, but
             it moves the ball.
+        walk_mm: of what the gauges' zero drifts along each axis from one reading at a point to the next;
+            zero unless the references that were read again show it.
         freedom: degrees of freedom with which all this was measured; infinite where it is stated.
         gauge_axes: rows of the matrix whose columns are the gauges' directions in the frame convention;
             empty where all gauges are alike, or along its axes.
@@ -47,6 +49,7 @@ class Noise:
     gauge_shares: tuple[float, ...] = ()
     gauge_axes: tuple[tuple[float, ...], ...] = ()
     stops: float = 0.0
+    walk_mm: float = 0.0
     freedom: float = np.inf
 
     def with_devices(self, encoders: Sequence[float], gauges_mm: Sequence[float]) -> Noise:

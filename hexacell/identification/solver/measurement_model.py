@@ -10,7 +10,8 @@ gauges were zeroed, the small rotation w of the gauges against the base, and the
 gauges, which are along their axes. All of them are linear, so for given weights their best values are
 computed and subtracted, and they never become parameters (variable projection; Golub and Pereyra 1973): c
 and w for each point, with a prior on w, and k once for all points, with a prior as well. Coefficients of
-terms beside the geometry (:mod:`hexacell.identification.terms`) are common to all records like k.
+terms beside the geometry (:mod:`hexacell.identification.terms`), and increments of a drift
+(:mod:`hexacell.identification.problem.random_walk`), are common to all records like k.
 """
 
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.identification.problem.problem import Problem
+from hexacell.identification.problem.random_walk import walk_columns
 from hexacell.kinematics.forward import ForwardResult, apply_twist, forward_kinematics
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
@@ -153,7 +155,7 @@ class ReducedSystem:
 
 
 class NuisanceElimination:
-    """The unknowns c, w, k and those of the terms at their best values, for weights (n, 3, 3), 1/mm^2."""
+    """The unknowns c, w, k, of drift and terms at their best values, for weights (n, 3, 3), 1/mm^2."""
 
     def __init__(self, problem: Problem, weights: Array) -> None:
         noise = problem.noise
@@ -175,11 +177,13 @@ class NuisanceElimination:
             shown = problem.deviations @ problem.gauges
             designs.append(-problem.gauges * shown[:, None, :])
             self._sigmas = np.full(3, noise.gauge_scale)
+        if noise.walk_mm > 0.0 and problem.records > problem.points:
+            designs.append(walk_columns(problem.first_rows, problem.records, noise.walk_mm))
         if problem.terms is not None:
             designs.append(-problem.terms.columns)
-            self._sigmas = np.append(self._sigmas, np.ones(problem.terms.columns.shape[-1]))
         if designs:
             common = np.concatenate(designs, axis=-1)
+            self._sigmas = np.append(self._sigmas, np.ones(common.shape[-1] - len(self._sigmas)))
             self._common_design, self._common_rows = self._without_stations(common)
             normal = self._gram(self._common_design, self._common_rows)
             self.common_covariance = np.linalg.inv(normal + np.diag(self._sigmas**-2))
@@ -239,5 +243,6 @@ class NuisanceElimination:
 
     def _gram(self, values: Array, penalties: Array) -> Array:
         """Weighted products (m, j) of the common design with values that contain no c and w."""
-        products: Array = np.einsum("nai,nab,nbj->ij", self._common_design, self._weights, values)
-        return products + self._common_rows.T @ penalties
+        flat, weighted = self._common_design, self._weights @ values
+        flat, weighted = (one.reshape(3 * len(one), one.shape[-1]) for one in (flat, weighted))
+        return np.asarray(flat.T @ weighted + self._common_rows.T @ penalties)

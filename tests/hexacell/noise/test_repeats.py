@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -73,3 +75,51 @@ def test_no_repeats_prove_nothing() -> None:
 def test_repeats_as_stated_prove_no_stops() -> None:
     random = np.random.default_rng(4)
     assert np.mean([repeats(1.0, random).unseen_stops(NOISE).size == 0.0 for _ in range(300)]) > 0.95
+
+
+def sets_that_drift(
+    random, walk_mm: float, *, stops: float = 0.0, noise: float = 1.0, sets: int = 5
+) -> Repeats:
+    """Six visits in short order, and the ends of sets, after 20 and 14 readings."""
+    changes = []
+    for readings in (0,) * 6 + (20,) + (14,) * (sets - 1):
+        by_joints = random.standard_normal((3, 6))
+        square = by_joints @ by_joints.T
+        covariance = 1e-4 * (square + np.eye(3))
+        actual = noise**2 * covariance + stops**2 * square + readings * walk_mm**2 * np.eye(3)
+        shown = random.multivariate_normal(np.zeros(3), actual)
+        changes.append(ReferenceChange(shown, covariance, square, np.zeros(3), np.zeros(6), 0.0, readings))
+    return Repeats(tuple(changes))
+
+
+@pytest.mark.sample("0.05")
+@pytest.mark.parametrize("walk_mm", [0.02, 0.05])
+def test_gauges_that_drift_are_found_with_the_size_of_a_step(walk_mm) -> None:
+    random = np.random.default_rng(5)
+    drawn = [sets_that_drift(random, walk_mm) for _ in range(200)]
+    assert np.mean([one.show_drift(NOISE) for one in drawn]) > 0.9
+    assert np.sqrt(np.mean([one.drift_mm**2 for one in drawn])) == pytest.approx(walk_mm, rel=0.05)
+
+
+@pytest.mark.sample("healthy")
+@pytest.mark.parametrize(
+    "other",
+    [
+        pytest.param({}, id="healthy"),
+        pytest.param({"stops": 0.03}, id="stops"),
+        pytest.param({"noise": 3.0}, id="noise"),
+        pytest.param({"sets": 1, "walk_mm": 0.05}, id="one set"),
+    ],
+)
+def test_what_is_no_drift_is_taken_for_none(other) -> None:
+    random = np.random.default_rng(6)
+    drawn = [sets_that_drift(random, **{"walk_mm": 0.0} | other) for _ in range(300)]
+    assert np.mean([one.show_drift(NOISE) for one in drawn]) <= 0.01
+
+
+def test_a_drift_that_is_known_is_no_noise() -> None:
+    random = np.random.default_rng(7)
+    found = sets_that_drift(random, 0.05)
+    known = replace(found, is_measured=True, walk_mm=0.05)
+    assert found.applied_to(NOISE).gauge_mm > 1.5 * NOISE.gauge_mm
+    assert known.applied_to(NOISE).gauge_mm == NOISE.gauge_mm

@@ -12,6 +12,7 @@ from hexacell.kinematics.pose import Pose
 from hexacell.noise.allowances import SIGMAS, Allowances
 from procedures.calibration.repeatability import since_zero
 from procedures.run.readings import Reading
+from procedures.run.state import SetState
 from tests.benchmarks.worlds.campaigns import setting
 from tests.benchmarks.worlds.not_geometry import effect_of, terms_of
 from tests.benchmarks.worlds.world import World
@@ -46,19 +47,19 @@ def test_a_reference_reached_from_another_side_is_no_slipped_gauge(allowances: A
     ball, encoders = allowances.ball_at(reference), np.zeros(6)
     moved = ball.motion(-0.5 * BACKLASH * (np.array(FROM_BOTH_SIDES) - FROM_BELOW))
     zero = reading(np.zeros(3), encoders, FROM_BELOW)
-    at_zero = SimpleNamespace(samples=[SimpleNamespace(reading=zero, pose=reference.as_tuple())])
+    at_zero = SetState((SimpleNamespace(reading=zero, pose=reference.as_tuple()),))  # type: ignore[arg-type]
     now = reading(moved, encoders, FROM_BOTH_SIDES)
     with_it, without = (
-        np.abs(since_zero(known, at_zero, now).unexplained_mm).max()  # type: ignore[arg-type]
+        np.abs(since_zero(known, at_zero, now).unexplained_mm).max()
         for known in (allowances, replace(allowances, found=None))
     )
     assert without > 0.2
     assert with_it < 0.3 * without
-    unknown = since_zero(allowances, at_zero, reading(moved, encoders, (0,) * 6))  # type: ignore[arg-type]
+    unknown = since_zero(allowances, at_zero, reading(moved, encoders, (0,) * 6))
     assert np.abs(unknown.unexplained_mm).max() > 0.2
     assert not unknown.exceeds(0.1), "joints of which nobody knows from which side they came"
     slipped = reading(moved + 1.0, encoders, FROM_BOTH_SIDES)
-    assert since_zero(allowances, at_zero, slipped).exceeds(0.1)  # type: ignore[arg-type]
+    assert since_zero(allowances, at_zero, slipped).exceeds(0.1)
 
 
 def test_few_visits_leave_room_for_a_larger_scatter(allowances: Allowances) -> None:
@@ -81,8 +82,8 @@ def test_a_controller_that_corrects_backlash_does_not_scatter(allowances: Allowa
     reference = Pose(*allowances.settings.identification.points[0])
     zero = reading(np.zeros(3), 0.5 * BACKLASH * FROM_BELOW, FROM_BELOW)
     now = reading(np.zeros(3), 0.5 * BACKLASH * FROM_BOTH_SIDES, FROM_BOTH_SIDES)
-    at_zero = SimpleNamespace(samples=[SimpleNamespace(reading=zero, pose=reference.as_tuple())])
-    change = since_zero(knows, at_zero, now)  # type: ignore[arg-type]
+    at_zero = SetState((SimpleNamespace(reading=zero, pose=reference.as_tuple()),))  # type: ignore[arg-type]
+    change = since_zero(knows, at_zero, now)
     assert change.joints == pytest.approx(np.zeros(6), abs=1e-9)
     by_encoders = np.linalg.norm(knows.ball_at(reference).motion(np.array(now.joints)))
     assert np.abs(change.unexplained_mm).max() < 0.3 * by_encoders

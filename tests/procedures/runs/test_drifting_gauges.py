@@ -1,0 +1,43 @@
+"""Gauges whose mounts drift: the run says so once, and the way of their zero is data."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from hexacell.campaign.pilots import FIRST_REPEAT
+from hexacell.errors import Interruption
+from hexacell.measurements.csv_file import read_measurements
+from procedures.journal.journal import read_journal
+from procedures.run.state import fold
+from procedures.steps import events
+from tests.procedures.replay.test_replayer import through
+from tests.procedures.rig import MakeRig
+from tests.procedures.runs.listening import happened, on, stop_here
+
+
+async def test_they_are_noticed_and_references_read_again_become_records(make_rig: MakeRig, tmp_path: Path):
+    rig = make_rig(noise__standstill_readings=16, noise__revisits=6, simulation__gauges__drift_um=20.0)
+    with pytest.raises(Interruption):
+        await rig.run(on(events.Identified, stop_here))
+    history = read_journal(rig.folder.journal)
+    state, (first, second) = fold(history), happened(rig, events.SetClosed)
+    assert first.walk_mm == 0.0, "one set may be of a gauge that slipped"
+    assert 0.002 < second.walk_mm < 0.02
+    told = [event.text(state) or "" for event in (first, second)]
+    assert ["the gauges drift" in text for text in told] == [False, True]
+    labels = [record.id for record in state.measurements().records]
+    again = [(1, FIRST_REPEAT + number) for number in range(6)]
+    taken = [(1, number) for number in range(2, 10)]
+    assert labels[:17] == [(1, 1), *again, *taken, (1, FIRST_REPEAT + 6), (2, 1)]
+    assert labels[-1] == (2, FIRST_REPEAT)
+    assert state.identified is not None
+    assert state.identified.result.records == len(labels) == 26
+    assert read_measurements(rig.folder.measurements) == state.measurements()
+    noise = rig.calibration.known(state).robot_of(state).noise
+    assert noise.walk_mm == second.walk_mm
+    assert noise.gauge_mm == pytest.approx(0.0012, rel=0.01), "what drifted between the visits is no noise"
+    report = await asyncio.to_thread(through, rig, history, tmp_path / "again")
+    assert report.differences == []

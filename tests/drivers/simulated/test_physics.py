@@ -69,18 +69,6 @@ def test_noise_is_drawn_at_every_stop_and_stays_until_the_next(make_twin) -> Non
         assert np.all(np.std(scatter, axis=0) > 0.004)
 
 
-def test_mounts_of_the_gauges_walk_from_stop_to_stop_by_the_time_in_between(make_twin) -> None:
-    twin = make_twin(gauges__drift_um=20.0, station_reach_mm=1e6)
-    start, seen = twin.physics._motion.path[0], []
-    for _ in range(60):
-        there_and_back(twin, start)
-        seen.append(twin.seen())
-        assert np.array_equal(twin.seen(), seen[-1])
-    steps = np.diff(seen, axis=0)  # of 20 s each
-    assert np.std(steps) == pytest.approx(0.02 * np.sqrt(20.0 / 60.0), rel=0.2)
-    assert np.ptp(seen, axis=0).min() > 2.0 * np.std(steps)
-
-
 def test_flicker_is_drawn_at_every_reading(make_twin) -> None:
     twin = make_twin(gauges__flicker_mm=0.002, encoders__flicker_mm=0.002)
     gauges = np.array([twin.seen() for _ in range(60)])

@@ -67,18 +67,6 @@ def test_the_reference_of_another_robot_is_no_drift(bundled_cell, robot) -> None
     assert slipped.exceeds(0.1)
 
 
-def test_a_drift_that_is_known_is_no_slipped_gauge(bundled_cell, robot) -> None:
-    """It explains more the later the reference is read again, and nothing at once."""
-    drifting = replace(robot, noise=replace(robot.noise, walk_mm=0.02))
-    after = 0.3 * np.eye(9)[0]
-    for allowances, later, exceeds in (
-        (Allowances(bundled_cell.settings, robot), 14, True),
-        (Allowances(bundled_cell.settings, drifting), 14, False),
-        (Allowances(bundled_cell.settings, drifting), 0, True),
-    ):
-        assert allowances.since(REFERENCE, np.zeros(9), after, None, later).exceeds(0.1) is exceeds
-
-
 def test_it_is_there_where_the_encoders_show_it_whatever_commanded_it(robot) -> None:
     """While points are measured a provisional geometry may command, and bring the ball elsewhere."""
     [truth] = drawn(robot, 1, seed=3)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from hexacell.campaign.pilots import FIRST_REPEAT
 from hexacell.errors import Interruption
+from hexacell.kinematics.pose import Pose
 from hexacell.measurements.csv_file import read_measurements
 from procedures.journal.journal import read_journal
 from procedures.run.state import fold
@@ -36,7 +39,13 @@ async def test_they_are_noticed_and_references_read_again_become_records(make_ri
     assert state.identified is not None
     assert state.identified.result.records == len(labels) == 26
     assert read_measurements(rig.folder.measurements) == state.measurements()
-    noise = rig.calibration.known(state).robot_of(state).noise
+    known = rig.calibration.known(state)
+    reference, slipped = Pose(*state.sets[first.at].samples[0].pose), 0.15 * np.eye(9)[0]
+    change = partial(known.allowances.since, reference, np.zeros(9), slipped, None)
+    assert [change(readings).exceeds(0.1) for readings in (0, 100)] == [True, False], (
+        "a drift explains more"
+    )
+    noise = known.robot_of(state).noise
     assert noise.walk_mm == second.walk_mm
     assert noise.gauge_mm == pytest.approx(0.0012, rel=0.01), "what drifted between the visits is no noise"
     report = await asyncio.to_thread(through, rig, history, tmp_path / "again")

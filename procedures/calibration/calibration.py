@@ -246,7 +246,11 @@ class Knowledge:
             found = identify(first.problem(state.measurements()))
         except IdentifiabilityError:  # too few by now
             return first
-        return self._as_measured(robot, state, found)
+        measured = self._as_measured(robot, state, found)
+        if self.walk_mm and not identify(measured.problem(state.measurements())).goodness.is_explained:
+            # What does not repeat otherwise has seemed a drift.
+            return replace(self, walk_mm=0.0)._measured(robot, state)
+        return measured
 
     def _as_measured(self, robot: Robot, state: RunState, found: Identification | None = None) -> Robot:
         """The robot with the temperatures read while measuring, and the noise that all repeats show.
@@ -255,7 +259,7 @@ class Knowledge:
         """
         noise, settings = self.noise, self.settings
         if noise is not None and found is not None:
-            noise = noise_again(self.calibration.plan, state, found) or noise
+            noise = noise_again(self.calibration.plan, state, found, self.walk_mm) or noise
             settings = with_measured_noise(self.calibration.settings, noise)
             robot = replace(robot, noise=noise_of(settings))
         robot = self._at_temperatures(robot, settings, state.temperature_range_k)

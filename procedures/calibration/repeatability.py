@@ -125,7 +125,9 @@ def drift_by_repeats(plan: Plan, state: RunState, allowances: Allowances) -> flo
     return Repeats(tuple(repeated_readings(state, plan, stated))).drift_mm
 
 
-def noise_again(plan: Plan, state: RunState, found: Identification) -> MeasuredNoise | None:
+def noise_again(
+    plan: Plan, state: RunState, found: Identification, walk_mm: float = 0.0
+) -> MeasuredNoise | None:
     """The measured noise by the visits, with the geometry that was identified; None without."""
     allowances = Allowances(plan.settings, plan.robot, is_measured=True, found=found)
     if state.noise is None or (visits := _visits(plan, state, allowances)) is None:
@@ -133,7 +135,7 @@ def noise_again(plan: Plan, state: RunState, found: Identification) -> MeasuredN
     visited = state.set(state.noise.at)
     # A random walk of n steps varies about its mean by a sixth of n.
     steps = (len(visited.visits) + len(visited.pilots)) / 6.0
-    return assess_again(plan, visits, state.noise.noise, found, state.walk_mm * float(np.sqrt(steps)))
+    return assess_again(plan, visits, state.noise.noise, found, walk_mm * float(np.sqrt(steps)))
 
 
 def _visits(plan: Plan, state: RunState, allowances: Allowances) -> NoiseReadings | None:

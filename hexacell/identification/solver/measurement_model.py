@@ -243,6 +243,6 @@ class NuisanceElimination:
 
     def _gram(self, values: Array, penalties: Array) -> Array:
         """Weighted products (m, j) of the common design with values that contain no c and w."""
-        flat, weighted = self._common_design, self._weights @ values
-        flat, weighted = (one.reshape(3 * len(one), one.shape[-1]) for one in (flat, weighted))
-        return np.asarray(flat.T @ weighted + self._common_rows.T @ penalties)
+        both = self._common_design, self._weights @ values
+        design, weighted = (one.reshape(3 * len(one), one.shape[-1]) for one in both)
+        return np.asarray(design.T @ weighted + self._common_rows.T @ penalties)

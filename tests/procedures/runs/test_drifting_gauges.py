@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +24,8 @@ from tests.procedures.runs.listening import happened, on, stop_here
 
 
 async def test_they_are_noticed_and_references_read_again_become_records(make_rig: MakeRig, tmp_path: Path):
-    rig = make_rig(noise__standstill_readings=16, noise__revisits=6, simulation__gauges__drift_um=20.0)
+    noise: dict[str, Any] = {"noise__standstill_readings": 16, "noise__revisits": 6}
+    rig = make_rig(simulation__seed=2, simulation__gauges__drift_um=10.0, **noise)
     with pytest.raises(Interruption):
         await rig.run(on(events.Identified, stop_here))
     history = read_journal(rig.folder.journal)
@@ -45,8 +48,10 @@ async def test_they_are_noticed_and_references_read_again_become_records(make_ri
     assert [change(readings).exceeds(0.1) for readings in (0, 100)] == [True, False], (
         "a drift explains more"
     )
-    noise = known.robot_of(state).noise
-    assert noise.walk_mm == second.walk_mm
-    assert noise.gauge_mm == pytest.approx(0.0012, rel=0.01), "what drifted between the visits is no noise"
+    found = known.robot_of(state).noise
+    assert found.walk_mm == second.walk_mm
+    assert found.gauge_mm == pytest.approx(0.0012, rel=0.01), "what drifted between the visits is no noise"
+    denied = replace(known, walk_mm=1e-6).robot_of(state).noise
+    assert denied.walk_mm == 0.0, "residuals that a drift does not explain are of something else"
     report = await asyncio.to_thread(through, rig, history, tmp_path / "again")
     assert report.differences == []

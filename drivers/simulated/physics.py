@@ -260,8 +260,7 @@ class RobotPhysics:
             flicker = self._settings.encoders.flicker * self._random.standard_normal(6)
             now = self._clock.now()
             shown = self._shown_per_mm * self._motion.joints(now)
-            measured: Array = shown + self._encoder_noise + flicker
-            return measured
+            return shown + self._encoder_noise + flicker
 
     def gauge_displacement(self, axis: str) -> float:
         """The ball's displacement along a gauge's axis from the middle of its travel, with noise, mm."""

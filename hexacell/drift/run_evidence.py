@@ -146,8 +146,7 @@ def _whitened(causes: Array, values: Array) -> Array:
     factor = np.linalg.cholesky(np.eye(len(causes)) + causes @ causes.T)
     from scipy.linalg import solve_triangular  # noqa: PLC0415 - a tenth of a second
 
-    whitened: Array = solve_triangular(factor, values, lower=True)
-    return whitened
+    return solve_triangular(factor, values, lower=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -163,8 +162,7 @@ class CarriedPosterior(RunEvidence):
     @property
     def state(self) -> Array:
         """The estimate (s,)."""
-        found: Array = np.linalg.solve(self.information, self.weighted)
-        return found
+        return np.linalg.solve(self.information, self.weighted)
 
     def after(self, *runs: RunEvidence) -> CarriedPosterior:
         """The posterior with some more runs."""

@@ -1,6 +1,7 @@
 """A geometry in several files: each parameter in one of them, whichever."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ HAL, INI, LINES, TOML = "linuxcnc-hal", "linuxcnc-ini", "template", "toml"
 
 
 def part(name: str, **options):
-    kinds = {HAL: HalPins, INI: LinuxcncIni, LINES: LineTemplates, TOML: NativeToml}
+    kinds: dict[str, Any] = {HAL: HalPins, INI: LinuxcncIni, LINES: LineTemplates, TOML: NativeToml}
     return FormatOfFile(name, kinds[name](HEXAGLIDE_PARAMETERS, options, is_part=True))
 
 

@@ -239,4 +239,7 @@ class ThermometerSettings(Section):
     legs: tuple[LegNumber, ...] = key(
         (), "legs that the thermometer is on, from 1: their expansion is no drift", max_length=6
     )
+    part: Literal["base"] | None = key(
+        None, "base: it is on the base with its scales, in relation to which legs then expand"
+    )
     timeout_s: Positive = key(2.0, "longest wait for a reading, s")

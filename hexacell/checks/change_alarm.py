@@ -16,6 +16,7 @@ from hexacell.checks.check import Check
 from hexacell.drift.run_evidence import Causes, WhitenedRecords, whiten_records
 from hexacell.drift.single_cause import SingleCauseTest, possible_legs, single_cause_test
 from hexacell.identification.problem.prior import IdentifiedBefore
+from hexacell.identification.thermal_expansion import ThermalExpansion
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import free_parameter_derivatives
 from hexacell.kinematics.parameters import MachinePart
@@ -113,7 +114,9 @@ def machine_records(
     """The records of a run at the free parameters (p,), with what differs from run to run as noise."""
     own = tuple(one for one in robot.effects if one.occurrence is Occurrence.MEASURING)
     shared = tuple(one for one in robot.effects if one.occurrence is not Occurrence.MEASURING)
-    problem = replace(robot.problem(measurements), systematic=partial(errors_by_effects, shared))
+    # What thermometers on legs show is in ``expansion``, and not in the joint variables as well.
+    as_read = replace(robot, expansion=ThermalExpansion())
+    problem = replace(as_read.problem(measurements), systematic=partial(errors_by_effects, shared))
     order = np.argsort(measurements.group, kind="stable")
     by_row = None if expansion is None else expansion[order]
     return whiten_records(problem, free, of_this_run=partial(errors_by_effects, own), expansion=by_row)

@@ -27,7 +27,7 @@ from hexacell.kinematics.rotations import Array
 from hexacell.lengths import from_to
 from hexacell.measurements.records import MeasurementSet
 from hexacell.results.absorbed_terms import errors_of_geometry_alone
-from hexacell.results.result import IdentificationResult, LengthResult
+from hexacell.results.result import IdentificationResult, LengthResult, legs_at
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.length_records import JudgedGeometry
 from hexacell.verdict.decision import Verdict, VerifiedAccuracy, worst_verdict
@@ -251,6 +251,8 @@ def outcome_line(
     if result.identifies is not ParameterChoice.ALL:
         what = f"zeros only, {unknowns} of {what}"
     parts = [f"{what}, {result.records} records at {result.points} points"]
+    if legs := legs_at(result.holds_at_c):
+        parts.append(f"geometry of {legs}")
     if verified.before_mm is not None and verified.after_mm is not None:
         means = from_to(verified.before_mm, verified.after_mm, 2)
         parts.append(f"mean deviation at held-out poses {means}")

@@ -8,6 +8,7 @@ from hexacell.cell.devices import ThermometerSettings
 from hexacell.cell.fields import Frozen
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
+from hexacell.measurements.records import Temperatures
 from procedures.run.keys import ArrivalDirections, SixNumbers, ThreeNumbers
 
 
@@ -37,7 +38,7 @@ class Reading(RawReadings):
 
     ``gauges_mm`` and ``spread_mm`` are mean and range along base x, y, z; ``joints`` are the mean joint
     variables, mm or deg, and ``directions`` those in which each had arrived. ``temperatures`` are those of
-    the cell's thermometers just afterwards.
+    the cell's thermometers just afterwards, ``part_temperatures`` of legs and base by them.
     """
 
     gauges_mm: ThreeNumbers
@@ -45,6 +46,7 @@ class Reading(RawReadings):
     joints: SixNumbers
     temperatures: tuple[Temperature, ...] = ()
     directions: ArrivalDirections = ()
+    part_temperatures: Temperatures = ()
 
 
 class ReadingSeries(RawReadings):
@@ -60,6 +62,14 @@ class ReadingSeries(RawReadings):
 def in_words(deviation_mm: Iterable[float]) -> str:
     """Three numbers along x, y and z, mm."""
     return ", ".join(f"{axis} {value:+.3f}" for axis, value in zip("xyz", deviation_mm, strict=True))
+
+
+def on_parts(thermometers: Iterable[ThermometerSettings], shown: Iterable[Temperature]) -> Temperatures:
+    """The temperatures of legs and base by what thermometers showed; empty if none on one did."""
+    celsius = {one.name: one.celsius for one in shown}
+    placed = {place: celsius.get(one.name) for one in thermometers for place in (*one.legs, one.part)}
+    found = tuple(placed.get(place) for place in (*range(1, LEGS + 1), "base"))
+    return found if any(one is not None for one in found) else ()
 
 
 def legs_warmer(

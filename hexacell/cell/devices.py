@@ -233,7 +233,7 @@ class ThermometerSettings(Section):
     path: Text = key(
         ...,
         "sysfs: the file with the temperature in millidegrees, such as "
-        "/sys/bus/w1/devices/28-.../temperature",
+        "/sys/bus/w1/devices/28-.../temperature; simulated: one on the simulated machine",
         min_length=1,
     )
     legs: tuple[LegNumber, ...] = key(

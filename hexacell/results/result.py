@@ -228,8 +228,8 @@ class AcceptedResult(Frozen):
         effects: what one unit of each cause of a systematic effect did to the free parameters: by the
             name of the effect, a row a cause.
         length: what the length check of its run found; None without one.
-        leg_temperatures_c: those of the legs at which the geometry holds; by older journals their means
-            while it was measured. None for a leg without a thermometer that answered.
+        leg_temperatures_c: of legs, and of the base, at which the geometry holds; by older journals means
+            of legs while it was measured. None for one without a thermometer that answered.
         identified: the geometry in the mechanism's frame convention, where the controller got another one;
             None where it has this one.
         terms: those beside the geometry that the robot has.

@@ -72,24 +72,6 @@ def on_parts(thermometers: Iterable[ThermometerSettings], shown: Iterable[Temper
     return found if any(one is not None for one in found) else ()
 
 
-def legs_warmer(
-    thermometers: Iterable[ThermometerSettings], readings: Sequence[Reading], before: Sequence[float | None]
-) -> Array:
-    """By how much each leg (n, 6), K, was warmer at n records than ``before``, deg C a leg.
-
-    0 of a leg without a thermometer. NaN of one whose thermometer never answered, or that has no
-    reference temperature. Where a thermometer once did not answer, the mean of what it showed counts.
-    """
-    warmer = np.zeros((len(readings), LEGS))
-    reference = [*before, *[None] * LEGS][:LEGS]
-    for thermometer in thermometers:
-        shown = _shown(thermometer.name, readings)
-        for leg in thermometer.legs:
-            at_first = reference[leg - 1]
-            warmer[:, leg - 1] = shown - (np.nan if at_first is None else at_first)
-    return warmer
-
-
 def mean_leg_temperatures(
     thermometers: Iterable[ThermometerSettings], readings: Sequence[Reading]
 ) -> tuple[float | None, ...]:

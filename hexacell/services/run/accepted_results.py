@@ -9,7 +9,6 @@ from hexacell.config.change import Receipt
 from hexacell.config.layout import fingerprint
 from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
-from hexacell.kinematics.parameters import LEGS
 from hexacell.results.result import AcceptedResult, IdentificationResult, LengthResult
 from hexacell.runs.run_folder import RunFolder, run_folders
 from hexacell.services.history.journal_soundness import read_sound
@@ -86,7 +85,7 @@ def _result(
         terms=terms,
         length=_length(state),
         leg_temperatures_c=(
-            result.holds_at_c[:LEGS] or mean_leg_temperatures(cell.settings.thermometers, readings)
+            result.holds_at_c or mean_leg_temperatures(cell.settings.thermometers, readings)
         ),
     )
 

@@ -7,8 +7,7 @@ import numpy as np
 from hexacell.cell.devices import ThermometerSettings
 from hexacell.cell.fields import Frozen
 from hexacell.kinematics.parameters import LEGS
-from hexacell.kinematics.rotations import Array
-from hexacell.measurements.records import Temperatures
+from hexacell.measurements.records import Temperatures, temperatures_of
 from procedures.run.keys import ArrivalDirections, SixNumbers, ThreeNumbers
 
 
@@ -73,15 +72,12 @@ def on_parts(thermometers: Iterable[ThermometerSettings], shown: Iterable[Temper
 
 
 def mean_leg_temperatures(
-    thermometers: Iterable[ThermometerSettings], readings: Sequence[Reading]
+    thermometers: Sequence[ThermometerSettings], readings: Iterable[Reading]
 ) -> tuple[float | None, ...]:
     """The mean temperature of each leg, deg C; None of a leg that has no thermometer, or a silent one."""
-    means: list[float | None] = [None] * LEGS
-    for thermometer in thermometers:
-        shown = _shown(thermometer.name, readings)
-        for leg in thermometer.legs:
-            means[leg - 1] = None if np.isnan(shown).any() or not len(shown) else float(shown.mean())
-    return tuple(means)
+    shown = temperatures_of(on_parts(thermometers, reading.temperatures) for reading in readings)
+    columns = (column[np.isfinite(column)] for column in shown.T[:LEGS])
+    return tuple(float(column.mean()) if len(column) else None for column in columns)
 
 
 def mean_temperature(readings: Iterable[Reading]) -> float | None:
@@ -89,13 +85,3 @@ def mean_temperature(readings: Iterable[Reading]) -> float | None:
     every = [one.celsius for reading in readings for one in reading.temperatures]
     shown = [celsius for celsius in every if celsius is not None]
     return float(np.mean(shown)) if shown else None
-
-
-def _shown(name: str, readings: Sequence[Reading]) -> Array:
-    """What a thermometer showed at n records, gaps filled with the mean; NaN if it never answered."""
-    by_record = [{one.name: one.celsius for one in reading.temperatures}.get(name) for reading in readings]
-    shown = np.array([np.nan if celsius is None else celsius for celsius in by_record])
-    if np.isnan(shown).all():
-        return shown
-    filled: Array = np.where(np.isnan(shown), np.nanmean(shown), shown)
-    return filled

@@ -264,8 +264,8 @@ class ModelSettings(Section):
     )
     temperature_c: InRange | None = key(
         None,
-        "temperature at which the geometry is sought, where thermometers are on all legs, deg C; by "
-        "default that of the first record",
+        "temperature at which the geometry is sought, where legs have thermometers, deg C; by default that "
+        "of each at the first record of the first point",
         ge=-100,
         le=300,
     )

@@ -32,7 +32,8 @@ class ThermalExpansion:
 
     Attributes:
         legs_um_m_k, base_um_m_k: thermal expansion, um/m/K.
-        reference_c: of legs 1 to 6 and of the base, deg C; None: that of the first record that has one.
+        reference_c: of legs 1 to 6 and of the base, deg C; None: that of the first record, in the
+            order of a measurement set, that has one.
     """
 
     legs_um_m_k: float = 0.0

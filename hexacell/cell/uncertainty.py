@@ -92,7 +92,7 @@ class CommonUncertaintySettings(Section):
         "change of the temperature while measuring, K; a run with thermometers takes their range instead",
     )
     thermometers_k: NotNegative = key(
-        0.5, "uncertainty of a leg's temperature by its thermometer, K: DS18B20 0.5"
+        0.3, "uncertainty of the temperatures of legs by their thermometers, K; DS18B20: +-0.5 at most"
     )
     expansion_base_um_m_k: NotNegative = key(
         23.0, "thermal expansion of the base with its scales, um/m/K: aluminium 23, steel 11.5, granite 6"

@@ -105,8 +105,10 @@ def test_the_range_of_temperatures_is_that_of_one_thermometer(story) -> None:
         warm(story().sampled(2), room=19.5, rails=None),
         warm(story().sampled(3), room=19.25, rails=24.125),
     ]
-    assert fold(told).temperature_range_k == 0.5
-    assert fold([story().sampled()]).temperature_range_k is None
+    assert fold(told).temperature_range_k() == 0.5
+    assert fold(told).temperature_range_k(["room"]) == 0.125
+    assert fold(told).temperature_range_k(["room", "rails"]) == 0.5
+    assert fold([story().sampled()]).temperature_range_k() is None
 
 
 def test_held_out_deviations_leave_references_out(story) -> None:

@@ -133,7 +133,6 @@ class RecordedRun:
         return [protocol.StatusChanged(status=status), asked, at_cursor]
 
     async def _until_moved(self, sent: int) -> None:
-        """Wait until the cursor is moved, or moves by itself."""
         advancing = asyncio.ensure_future(self._advance(sent))
         try:
             await self._moved.wait()

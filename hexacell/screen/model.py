@@ -162,7 +162,6 @@ class ScreenModel:
                 raise UsageError(f"there is no screen {screen!r}")
 
     def _devices_now(self) -> list[Line]:
-        """The devices as they show now."""
         snapshot, later_s = self._live()
         if self._devices.problem and snapshot is None:
             return [(self._devices.problem, Urgency.CALM)]

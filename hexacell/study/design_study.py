@@ -220,7 +220,6 @@ def design_trials_of(robots: int) -> list[DesignTrial]:
 
 
 def _swept(name: str, robots: int) -> dict[float, list[DesignTrial]]:
-    """The trials of a sweep by the value."""
     field, values = SWEEPS[name]
     usual = [DesignTrial(number) for number in range(min(robots, SWEPT))]
     varied: dict[float, dict[str, Any]] = {float(value): {field: value} for value in values}

@@ -47,7 +47,6 @@ def verification_text(verified: Verification) -> str:
 
 
 def _size(error: JudgedError, unit: str) -> str:
-    """An error and its uncertainty."""
     shown = error.shown_in(unit)
     return f"{shown.length(error.value)}, U {shown.number(error.expanded)}"
 

@@ -71,7 +71,6 @@ def _index(cell: Cell, options: argparse.Namespace, console: Console) -> RunInde
 
 
 def _fleet(options: argparse.Namespace, console: Console) -> ExitCode:
-    """The runs of all cells of an archive."""
     named = (options.compare, options.show, options.keep)
     is_one_cells = options.drift or options.changes or any(one is not None for one in named)
     if options.archive is None or is_one_cells:
@@ -99,7 +98,6 @@ def _keep(cell: Cell, options: argparse.Namespace, console: Console) -> None:
 
 
 def _changes(cell: Cell, console: Console) -> None:
-    """Every write into the config."""
     found = config_history(cell)
     for line in found.damaged:
         console.warn(f"{found.path}, line {line}: this record is torn, damaged or newer, and left out")

@@ -250,7 +250,6 @@ class _Event:
 
 
 def _range_problems(ranges: Sequence[tuple[float, float] | None] | None, what: str) -> Iterator[str]:
-    """Of joints or of axes."""
     if ranges is not None:
         if len(ranges) != LEGS:
             yield f"there are six {what}"

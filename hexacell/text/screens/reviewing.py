@@ -108,9 +108,10 @@ def deviation_plot(state: RunState) -> PlotView:
     """The ball's distance from its reference at each held-out pose, as figures 8 and 9 of the paper."""
     series = []
     for name, marker, phase in (("before", "o", Phase.BEFORE), ("after", "x", Phase.AFTER)):
-        sizes = [float(np.linalg.norm(one)) for one in state.held_out(phase)]
-        numbers = tuple(float(number) for number in range(1, len(sizes) + 1))
-        series.append(Series(name, marker, numbers, tuple(max(size, 1e-4) for size in sizes)))
+        sizes = (max(float(np.linalg.norm(one)), 1e-4) for one in state.held_out(phase))
+        series.append(
+            Series(name, marker, tuple((float(n), size) for n, size in enumerate(sizes, start=1)))
+        )
     return PlotView(
         title="Deviation per held-out pose, mm",
         x_label="held-out pose",
@@ -130,11 +131,10 @@ def residual_plot(picture: RunPicture) -> PlotView:
         pairs = zip(sample.deviation_mm, expected.deviation_mm, expected.sigma_mm, strict=True)
         scaled = [(measured - predicted) / sigma for measured, predicted, sigma in pairs if sigma > 0.0]
         found.append((float(number), max(scaled, key=abs, default=0.0)))
-    numbers, residuals = tuple(one for one, _ in found), tuple(two for _, two in found)
     return PlotView(
         title="Residual per record, sigma",
         x_label="record",
-        series=(Series("largest of x, y, z", "o", numbers, residuals),),
+        series=(Series("largest of x, y, z", "o", tuple(found)),),
         level=0.0,
         note="No record beside a reference is taken yet.",
     )

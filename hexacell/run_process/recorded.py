@@ -23,12 +23,8 @@ LONGEST_WAIT_S = 60.0
 class RecordedRun:
     """A :class:`~hexacell.run_process.client.RunConnection` that sends a journal up to its cursor.
 
-    Questions are sent where the journal shows that they were asked: those to place gauges.
-
-    Args:
-        folder: the folder of the run, which may still be going on; it is shown as far as it was.
-        sequence: the line of the journal at which the cursor stands at first; 0 is the end.
-        clock: the clock by which it advances.
+    Questions are sent where the journal shows that they were asked: those to place gauges. A run that still
+    goes on is shown as far as it was. The cursor stands at the line ``sequence`` at first; 0 is the end.
 
     Raises:
         FileError: the journal cannot be read, or is empty.

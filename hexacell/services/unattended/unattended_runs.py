@@ -48,7 +48,7 @@ def refuse_quiet_hours(settings: CellSettings, at: datetime) -> None:
 
 
 def refused_start(request: RunRequest, error: HexacellError, began: datetime, at: datetime) -> float | None:
-    """Note for the history that a run could not begin; gives the seconds until the next try, if there is one.
+    """Note for the history that a run could not begin; gives seconds until the next try, if there is one.
 
     It was tried first when it ``began``. A disk that takes no note does not change what is reported.
     """

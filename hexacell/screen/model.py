@@ -153,13 +153,11 @@ class ScreenModel:
                 }
             case "review":
                 return self._result()
-            case "history":
+            case _:  # the history
                 title = history_head() if self.runs else reviewing.READING if self.runs is None else NO_RUNS
                 asked = () if self.runs is None else (*reviewing.WHAT_TO_PRESS, "", *self._compared)
                 rows = [(run.name, history_line(run)) for run in self.runs or ()]
                 return {"history-header": (title,), "comparison": (asked,), "runs": (rows,)}
-            case _:
-                raise UsageError(f"there is no screen {screen!r}")
 
     def _devices_now(self) -> list[Line]:
         snapshot, later_s = self._live()

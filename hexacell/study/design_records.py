@@ -62,7 +62,6 @@ class ChosenRecords:
 
     robot: Robot
     measurements: MeasurementSet
-    outside: int = 0
 
 
 def chosen_records(
@@ -82,7 +81,7 @@ def chosen_records(
             plan = Plan(settings, robot, with_forecast=False)
             campaign = VirtualCampaign(plan, VirtualRobot(robot, truth, random))
             campaign.carry_out()
-            return ChosenRecords(campaign.plan.robot, campaign.measurements, campaign.outside)
+            return ChosenRecords(campaign.plan.robot, campaign.measurements)
         case OrientationChoice.FIXED:
             return ChosenRecords(robot, _visited(robot, truth, _best_fixed(settings, robot, truth), random))
         case OrientationChoice.SIFTED:

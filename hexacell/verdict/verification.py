@@ -37,7 +37,6 @@ from hexacell.verdict.model_evidence import (
     ZEROS_DOUBTED,
     ModelTest,
     confirmed,
-    doubts_zeros,
     fails_narrowly,
     model_tests,
     with_zeros_doubted,
@@ -279,7 +278,8 @@ def reason_of(verified: Verification) -> str:
     """Why a verdict is not that of the error shown; empty where it is."""
     failed = [test.sentence for test in verified.tests if not test.passed]
     if verified.is_worse:
-        doubt = f"; {ZEROS_DOUBTED.rstrip('.')}" if doubts_zeros(verified.tests) else ""
+        is_of_zeros = any(sentence.endswith(ZEROS_DOUBTED) for sentence in failed)
+        doubt = f"; {ZEROS_DOUBTED.rstrip('.')}" if is_of_zeros else ""
         return f"worse than before{doubt}"
     if verified.verdict is Verdict.NOT_EVALUATED and failed:
         return failed[0].rstrip(".")

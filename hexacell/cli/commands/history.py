@@ -13,7 +13,7 @@ from hexacell.errors import ExitCode, UsageError
 from hexacell.results.run_comparison import ParameterTrend, RunComparison
 from hexacell.runs.run_folder import RunFolder, find_run
 from hexacell.services.history.cell_status import fleet_runs
-from hexacell.services.history.drift_history import DriftHistory, FoundChange, drift_history
+from hexacell.services.history.drift_history import DriftHistory, drift_history
 from hexacell.services.history.past_runs import (
     compare_runs,
     delete_runs,
@@ -137,14 +137,12 @@ def _drift_document(found: Sequence[ParameterTrend], watched: DriftHistory) -> d
         "parameters": [{**asdict(one), "walking": one.is_walking} for one in found],
         "runs": watched.runs,
         "temperatures_c": watched.celsius,
-        "changes": [_change_document(one) for one in watched.changes],
+        "changes": [
+            asdict(one) | {"leg": one.leg, "parameter": one.parameter.name, "unit": one.parameter.kind.unit}
+            for one in watched.changes
+        ],
         "shares_of_limit": dict(watched.shares),
     }
-
-
-def _change_document(found: FoundChange) -> dict[str, Any]:
-    parameter = {"parameter": found.parameter.name, "unit": found.parameter.kind.unit}
-    return asdict(found) | {"leg": found.leg, **parameter}
 
 
 def _write_document(write: ConfigWrite) -> dict[str, Any]:

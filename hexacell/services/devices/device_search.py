@@ -103,11 +103,6 @@ def found_bank(found: SearchFindings) -> tuple[BusFindings, tuple[FoundNode, ...
     return None
 
 
-def unknown_encoders(found: SearchFindings) -> BusFindings | None:
-    """The first bus with frames of no CANopen node, which may be those of encoders."""
-    return next((bus for bus in found.buses if bus.frames), None)
-
-
 def gauge_keys(gauge: FoundGauge) -> Document:
     """What a gauge reported beside its address: its channel, its line and the last digit of its display."""
     decimals = len(gauge.shown.rstrip("<=>, M").partition(".")[2])

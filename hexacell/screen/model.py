@@ -213,8 +213,10 @@ class ScreenModel:
             shown: dict[str, tuple[Any, ...]] = {name: (text,) for name, text in texts.items()}
             urgency = reviewing.URGENCIES.get(picture.state.verdict, Urgency.ATTENTION)
             shown["verdict"] = (texts["verdict"], urgency)
-            plots = enumerate(reviewing.review_plots(picture))
-            self._reviewed = (seen, shown | {f"plot-{number}": (plot,) for number, plot in plots})
+            shown["plot-0"] = (reviewing.deviation_plot(picture.state),)
+            shown["plot-1"] = (reviewing.residual_plot(picture),)
+            shown["plot-2"] = (accuracy_plot(picture, None),)
+            self._reviewed = (seen, shown)
         return self._reviewed[1]
 
     def question(self) -> QuestionView | None:

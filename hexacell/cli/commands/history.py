@@ -138,7 +138,12 @@ def _drift_document(found: Sequence[ParameterTrend], watched: DriftHistory) -> d
         "runs": watched.runs,
         "temperatures_c": watched.celsius,
         "changes": [
-            asdict(one) | {"leg": one.leg, "parameter": one.parameter.name, "unit": one.parameter.kind.unit}
+            asdict(one)
+            | {
+                "leg": one.possible_legs[0],
+                "parameter": one.parameter.name,
+                "unit": one.parameter.kind.unit,
+            }
             for one in watched.changes
         ],
         "shares_of_limit": dict(watched.shares),

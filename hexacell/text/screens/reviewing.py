@@ -6,7 +6,6 @@ from hexacell.cell.model import CellSettings
 from hexacell.text.config_changes import pending_text
 from hexacell.text.line_face import event_text
 from hexacell.text.parameters import parameter_table, rows_of_run
-from hexacell.text.screens.measuring import accuracy_plot
 from hexacell.text.screens.questions import PERSON, approval_refusal
 from hexacell.text.screens.run_picture import RunPicture
 from hexacell.text.screens.views import Choice, PlotView, QuestionView, Series, Urgency
@@ -52,11 +51,6 @@ def review_texts(
         "parameters": "\n".join(parameters) or "The geometry is not identified yet.",
         "change": change or "There is no change yet.",
     }
-
-
-def review_plots(picture: RunPicture) -> tuple[PlotView, ...]:
-    """Deviations of the held-out poses, residuals of the records, and the predicted accuracy."""
-    return deviation_plot(picture.state), residual_plot(picture), accuracy_plot(picture, None)
 
 
 def _scope(state: RunState) -> tuple[str, ...]:

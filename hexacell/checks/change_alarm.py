@@ -21,7 +21,6 @@ from hexacell.kinematics.mechanism import free_parameter_derivatives
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MEASURED_PARTS, MeasurementSet, Temperatures
 from hexacell.robot.model import Robot
-from hexacell.uncertainty.effect_kinds import UM_PER_M
 from hexacell.uncertainty.effects import Effect, Occurrence, errors_by_effects
 
 FIRST_RECORDS = 8

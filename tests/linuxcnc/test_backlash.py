@@ -107,7 +107,7 @@ def test_backlash_is_identified_and_the_real_controller_corrects_it(lagging_mach
 
 
 def true_error_mm(machine: LinuxCNC) -> float:
-    """The largest at the task poses, with the geometry that only the simulation knows, in the best frames."""
+    """The largest at the task poses in the best frames, by the geometry of the simulation."""
     cell = load_cell(machine.folder / "cell.toml")
     assert cell.settings.simulation is not None
     robot = robot_of(cell)

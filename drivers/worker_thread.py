@@ -33,13 +33,12 @@ class WorkerThread:
         weakref.finalize(self, self._jobs.put, None)
 
     def submit(self, job: Callable[[], object]) -> None:
-        """Run ``job`` after the jobs before it; nobody waits for it, and its errors are dropped."""
-
-        def without_errors() -> None:
-            with suppress(Exception):
-                job()
-
-        self._put(without_errors)
+        """Run ``job``, which raises nothing, after the jobs before it; nobody waits for it."""
+        if self.closing.is_set():
+            raise RuntimeError(f"the thread {self._thread.name} has ended")
+        if self._thread.ident is None:
+            self._thread.start()
+        self._jobs.put(job)
 
     async def run(self, job: Callable[[], Result]) -> Result:
         """Run ``job`` after the jobs before it, and return its result."""
@@ -57,15 +56,8 @@ class WorkerThread:
 
     def _begun(self, job: Callable[[], Result]) -> asyncio.Future[Result]:
         done: asyncio.Future[Result] = asyncio.get_running_loop().create_future()
-        self._put(partial(_carry_out, job, done))
+        self.submit(partial(_carry_out, job, done))
         return done
-
-    def _put(self, job: Callable[[], object]) -> None:
-        if self.closing.is_set():
-            raise RuntimeError(f"the thread {self._thread.name} has ended")
-        if self._thread.ident is None:
-            self._thread.start()
-        self._jobs.put(job)
 
 
 def _work(jobs: Jobs) -> None:

@@ -1,7 +1,5 @@
 """Six CANopen encoders (CiA 406), sampled simultaneously: one SYNC, six positions."""
 
-from __future__ import annotations
-
 import threading
 from dataclasses import replace
 from pathlib import Path

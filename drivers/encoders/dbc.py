@@ -5,8 +5,6 @@ was asked for, and a sample is complete if all six came within a window of time:
 simultaneous. cantools is imported when a cell names such a file.
 """
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable

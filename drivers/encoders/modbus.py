@@ -6,8 +6,6 @@ cannot, they are asked there and back, and the mean is the position at the insta
 at rest and at a constant speed.
 """
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -8,15 +8,13 @@ import logging
 import struct
 import termios
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Any
 
-import serial
-
 from drivers.errors import optional
-from drivers.serial.opening import SLICE_S, lost_port, opened_port
+from drivers.serial.opening import SLICE_S, lost_port, opened_port, sent
 from drivers.serial.request_port import NoAnswer, RequestPort, is_copies
 from drivers.wire_trace import TrafficDirection
 from hexacell.clock import Patience
@@ -73,7 +71,7 @@ class ModbusPort(RequestPort):
             port: Any = opened_port(
                 self.url, line, self.subject, self.closing, client.inter_byte_timeout or None
             )
-            port.write = partial(_sent, port.write)
+            port.write = partial(sent, port.write)
             client.socket, client.recv = port, self._next_bytes
             self._client = client
             self.open_count += 1
@@ -171,13 +169,3 @@ class ModbusPort(RequestPort):
         except (OSError, termios.error, self._modbus.exceptions.ModbusException) as error:
             self.close()
             raise lost_port(self.subject, self.url, str(error)) from error
-
-
-def _sent(write: Callable[[bytes], object], data: bytes) -> int:
-    """Write a request, whose answer shows whether it arrived; to pymodbus the error means a lost line.
-
-    pyserial also raises it if all was sent and this thread was then not scheduled for so long.
-    """
-    with suppress(serial.SerialTimeoutException):
-        write(data)
-    return len(data)

@@ -7,7 +7,7 @@ import errno
 import os
 import termios
 import threading
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from enum import StrEnum
@@ -88,6 +88,16 @@ def close_port(port: serial.Serial) -> None:
         port.close()
     if connection is not None:
         connection.close()
+
+
+def sent(write: Callable[[bytes], object], data: bytes) -> int:
+    """Write a request by a port's ``write``; how long it is. The answer shows whether it arrived.
+
+    pyserial's error also comes if all was sent and this thread was then not scheduled for so long.
+    """
+    with suppress(serial.SerialTimeoutException):
+        write(data)
+    return len(data)
 
 
 def lost_port(subject: str, url: str, reason: str, action: str = "Plug it in") -> PortLost:

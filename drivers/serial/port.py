@@ -7,7 +7,7 @@ opening of a network port, which pyserial limits to five seconds.
 import termios
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from math import inf
 
 import serial
@@ -19,6 +19,7 @@ from drivers.serial.opening import (
     in_software,
     lost_port,
     opened_port,
+    sent,
 )
 from drivers.serial.request_port import (
     FRAME_LIMIT,
@@ -194,10 +195,7 @@ class SerialPort(RequestPort):
         request = request if self._parity is None else self._parity.encode(request)
         self._record(TrafficDirection.SENT, request)
         self._asked_at = self._last_traffic = time.monotonic()
-        # pyserial also raises it if all was sent and this thread was then not scheduled for so long;
-        # the response shows whether the request arrived.
-        with suppress(serial.SerialTimeoutException):
-            port.write(request)
+        sent(port.write, request)
 
     @contextmanager
     def _port_errors(self) -> Iterator[None]:

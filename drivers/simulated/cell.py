@@ -17,6 +17,7 @@ from drivers.simulated.robot import SimulatedMachine
 from drivers.simulated.serial_line import PtyLine
 from drivers.simulated.served_device import ServedGroup
 from drivers.simulated.slcan import SlcanServer
+from drivers.simulated.thermometers import SimulatedThermometers
 from hexacell.cell.devices import EncoderSettings, GaugeSettings
 from hexacell.cell.model import CellSettings
 from hexacell.cell.simulation import SimulationSettings
@@ -144,6 +145,9 @@ class SimulatedCell(ServedGroup):
             )
             self.gauges, self.encoders = sensors.gauges, sensors.encoders
             self.controller = served.enter_context(SimulatedController(self.machine, settings.controller))
+            warmth = served.enter_context(
+                SimulatedThermometers(settings.thermometers, self.physics.celsius)
+            )
             self.faults = CellFaults(self.gauges, self.encoders, self.controller, self.machine, stop_file)
             self.schedule = served.enter_context(FaultSchedule(self.faults, clock, simulation.faults))
             self.physics.on_motion_start = self.schedule.on_motion_start
@@ -152,5 +156,5 @@ class SimulatedCell(ServedGroup):
         controller = settings.controller.model_copy(update=address)
         guards = settings.guards.model_copy(update={"stop_file": str(stop_file)})
         self.settings = sensors.addressed(settings).model_copy(
-            update={"controller": controller, "guards": guards}
+            update={"controller": controller, "guards": guards, "thermometers": warmth.thermometers}
         )

@@ -102,7 +102,10 @@ class LoadedMachine:
             MachinePart.LEGS: 1e-6 * warmer_k * stated.expansion_legs_um_m_k,
         }
         of_kinds = {kind.symbol: growth[kind.part] if kind.part else 0.0 for kind in parameters.kinds}
-        geometry = Geometry(parameters, self._geometry.vector * (1.0 + parameters.by_kind(of_kinds)))
+        grown, legs = parameters.by_kind(of_kinds), MachinePart.LEGS
+        for row, one in enumerate(parameters.parameters):
+            grown[row] *= stated.legs_share[one.leg - 1] if one.kind.part is legs else 1.0
+        geometry = Geometry(parameters, self._geometry.vector * (1.0 + grown))
         is_linear = self._mechanism.words.joint_unit is JointUnit.MM
         return geometry, joints * (1.0 + growth[MachinePart.BASE]) if is_linear else joints
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivers.simulated.imperfections import Backlash, LoadedMachine
+from hexacell.cell.devices import ThermometerSettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.cell.uncertainty import LengthCheckSettings
 from hexacell.clock import CellClock
@@ -255,14 +256,19 @@ class RobotPhysics:
         with self._lock:
             return self._motion.fraction(self._clock.now())
 
+    def celsius(self, thermometer: ThermometerSettings) -> float:
+        """What a thermometer on a leg, or anywhere else on the machine, shows now, deg C."""
+        stated, legs = self._settings.temperature, thermometer.legs
+        share = stated.legs_share[legs[0] - 1] if legs else 1.0
+        return stated.start_c + share * self._machine.warmer_k(self._clock.now() - self._start_s)
+
     def encoder_positions(self) -> Array:
         """The joint variables measured by the encoders (6,), mm."""
         with self._lock:
             flicker = self._settings.encoders.flicker * self._random.standard_normal(6)
             now = self._clock.now()
             shown = self._shown_per_mm * self._motion.joints(now)
-            measured: Array = shown + self._encoder_noise + flicker
-            return measured
+            return shown + self._encoder_noise + flicker
 
     def gauge_displacement(self, axis: str) -> float:
         """The ball's displacement along a gauge's axis from the middle of its travel, with noise, mm."""

@@ -1,7 +1,5 @@
 """The simulated robot as its controller drives it, with the geometry and the corrections of the config."""
 
-from __future__ import annotations
-
 import threading
 from dataclasses import dataclass, field
 from pathlib import Path

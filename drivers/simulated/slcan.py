@@ -1,8 +1,8 @@
 """A CAN adapter that speaks slcan, the ASCII protocol of LAWICEL and CANable class devices.
 
 It makes a ``virtual`` CAN bus of this process available to other processes. Commands end with CR and are
-answered with CR, or BEL for an error; frames are ``t`` (11-bit id), ``T`` (29-bit), and ``r`` and
-``R`` for remote requests: id in hexadecimal, number of bytes, bytes.
+answered with CR, or BEL for an error; frames are ``t`` (11-bit id) and ``T`` (29-bit): id in
+hexadecimal, number of bytes, bytes. No device here knows remote requests.
 """
 
 import re
@@ -25,42 +25,25 @@ SEND_TIMEOUT_S = 0.2
 
 _OK = b"\r"
 _ERROR = b"\a"
-_FRAME = re.compile(r"(?:(?P<standard>[tr])([0-9A-Fa-f]{3})|(?P<extended>[TR])([0-9A-Fa-f]{8}))([0-8])(.*)")
+_FRAME = re.compile(r"(?:t([0-7][0-9A-Fa-f]{2})|T([01][0-9A-Fa-f]{7}))([0-8])((?:[0-9A-Fa-f]{2})*)")
 _SET_UP = re.compile(r"S[0-9]|s[0-9A-Fa-f]{4}|Y[0-9]?|Z[01]|")
 _INFORMATION = {"V": "V1013", "v": "v1013", "N": "NHX01", "F": "F00"}
 
 
 def encode_frame(message: can.Message) -> bytes:
     """A frame in slcan format, with its CR."""
-    kind = "r" if message.is_remote_frame else "t"
-    if message.is_extended_id:
-        head = f"{kind.upper()}{message.arbitration_id:08X}"
-    else:
-        head = f"{kind}{message.arbitration_id:03X}"
-    data = "" if message.is_remote_frame else bytes(message.data).hex().upper()
-    return f"{head}{message.dlc:d}{data}\r".encode()
+    number = message.arbitration_id
+    head = f"T{number:08X}" if message.is_extended_id else f"t{number:03X}"
+    return f"{head}{message.dlc:d}{bytes(message.data).hex().upper()}\r".encode()
 
 
 def decode_frame(command: str) -> can.Message | None:
     """The frame in a command (without CR); None if the command is no valid frame."""
     match = _FRAME.fullmatch(command)
-    if match is None:
+    if match is None or len(match[4]) != 2 * int(match[3]):
         return None
-    kind = match["standard"] or match["extended"]
-    identifier = int(match[2] or match[4], 16)
-    length, rest = int(match[5]), match[6]
-    is_remote = kind in "rR"
-    if identifier >= (1 << (29 if match["extended"] else 11)):
-        return None
-    if not re.fullmatch(f"[0-9A-Fa-f]{{{0 if is_remote else 2 * length}}}", rest):
-        return None
-    return can.Message(
-        arbitration_id=identifier,
-        is_extended_id=match["extended"] is not None,
-        is_remote_frame=is_remote,
-        dlc=length,
-        data=None if is_remote else bytes.fromhex(rest),
-    )
+    identifier, is_extended = int(match[1] or match[2], 16), match[2] is not None
+    return can.Message(arbitration_id=identifier, is_extended_id=is_extended, data=bytes.fromhex(match[4]))
 
 
 class SlcanAdapter:
@@ -137,7 +120,7 @@ class SlcanServer(Closeable):
     def _send_frames(self) -> None:
         while not self._closing.is_set():
             message = self._bus.recv(SLICE_S)
-            if message is not None and self._adapter.is_open:
+            if message is not None and not message.is_remote_frame and self._adapter.is_open:
                 self._write(encode_frame(message))
 
     def _write(self, data: bytes) -> None:

@@ -41,5 +41,4 @@ def held_out_sets(
 def held_out_turns(robot: Robot, settings: CellSettings, count: int, added_seed: int = 0) -> Array:
     """So many orientations (n, 3, 3), of which those of held-out poses are chosen."""
     limits, seed = robot.limits, settings.verification.seed + added_seed
-    turns: Array = orientations(count, limits.tilt, seed, most_twist=limits.turn)
-    return turns
+    return orientations(count, limits.tilt, seed, most_twist=limits.turn)

@@ -157,17 +157,12 @@ def update_estimate(
         problem = with_terms_of(problem, before.identification)
     kept = problem.subset(~problem.mask_of(before.false_records))
     found = _continued(kept, before.identification)
-    if _terms_are_due(found, before):
+    # Residuals that the noise does not explain are a reason to choose terms, or others.
+    is_due = bool(found.problem.offered) and found.records >= RECORDS_FACTOR * before.terms_tried
+    if is_due and found.noise_test.agreement is ChiSquareVerdict.TOO_LARGE:
         return _with_terms(problem, found)
     following = _following(problem, kept, found, before, tries_others=tries_others)
     return replace(following, terms=before.terms, terms_tried=before.terms_tried)
-
-
-def _terms_are_due(found: Identification, before: ChainedEstimate) -> bool:
-    """Whether residuals that the noise does not explain are a reason to choose terms, or others."""
-    is_due = found.records >= RECORDS_FACTOR * before.terms_tried
-    is_too_large = found.noise_test.agreement is ChiSquareVerdict.TOO_LARGE
-    return is_due and bool(found.problem.offered) and is_too_large
 
 
 def _with_terms(problem: Problem, found: Identification) -> ChainedEstimate:

@@ -55,5 +55,4 @@ def with_pilots(measurements: MeasurementSet, pilots: Sequence[Record]) -> Measu
 
 def are_counted(problem: Problem) -> Mask:
     """Which of a problem's records (n,) are no pilot records."""
-    counted: Mask = problem.labels[:, 1] < FIRST_PILOT
-    return counted
+    return problem.labels[:, 1] < FIRST_PILOT

@@ -323,7 +323,7 @@ class Plan:
             pose=self.robot.to_command(selected.command),
             joints=joints_of(record.targets.joints[0]),
             deviation=deviation_of(base @ record.deviation[0]),
-            sigma=deviation_of(record.shown_sigma[0]),
+            sigma=deviation_of(np.hypot(record.sigma, record.chance)[0]),
             gain=selected.gain,
             forecast=self.forecaster.forecast(state, belief, selected) if self.with_forecast else None,
             via=via,

@@ -145,5 +145,4 @@ def array_type(kind: ParameterKind) -> Any:  # noqa: ANN401 - a type made here
 
 def _derived(base: type[SectionType], /, **fields: Any) -> type[SectionType]:  # noqa: ANN401
     """A section with the fields that the mechanism decides; each is a type and a default or description."""
-    made: type[SectionType] = create_model(base.__name__, __base__=base, __doc__=base.__doc__, **fields)
-    return made
+    return create_model(base.__name__, __base__=base, __doc__=base.__doc__, **fields)

@@ -233,10 +233,13 @@ class ThermometerSettings(Section):
     path: Text = key(
         ...,
         "sysfs: the file with the temperature in millidegrees, such as "
-        "/sys/bus/w1/devices/28-.../temperature",
+        "/sys/bus/w1/devices/28-.../temperature; simulated: one on the simulated machine",
         min_length=1,
     )
     legs: tuple[LegNumber, ...] = key(
         (), "legs that the thermometer is on, from 1: their expansion is no drift", max_length=6
+    )
+    part: Literal["base"] | None = key(
+        None, "base: it is on the base with its scales, in relation to which legs then expand"
     )
     timeout_s: Positive = key(2.0, "longest wait for a reading, s")

@@ -123,7 +123,8 @@ class Diagnosis:
         known = list(map(parent.key, parent.model_fields)) if parent else []
         kind = "section" if isinstance(self.document.value(path), dict) else "key"
         action = f"Known here: {', '.join(known)}"
-        if homes := self._sections_with(str(path[-1])):
+        every = self._sections(self.model, ())
+        if homes := [self._header(at) for at, section in every if section.field_of(str(path[-1]))]:
             action = f"It belongs in {' or '.join(homes)}"
         return self.document.error(
             path,
@@ -163,11 +164,6 @@ class Diagnosis:
     def _header(self, path: KeyPath) -> str:
         """The header that opens the section at ``path``: ``[robot.nominal]``, ``[[gauges]]``."""
         return table_header((*path, 0) if self._section_at((*path, 0)) else path)
-
-    def _sections_with(self, key: str) -> list[str]:
-        """The headers of the sections that have ``key``."""
-        found = self._sections(self.model, ())
-        return [self._header(path) for path, section in found if section.field_of(key)]
 
     def _annotation_at(self, path: KeyPath) -> object:
         annotation: object = self.model

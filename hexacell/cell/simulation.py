@@ -139,10 +139,14 @@ class SimulatedLoad(Section):
 
 
 class SimulatedTemperature(Section):
-    """How the whole simulated machine becomes warmer, evenly, from the start of the cell."""
+    """How the simulated machine becomes warmer, evenly, from the start of the cell."""
 
     rise_k: InRange = key(0.0, "by how much in all, K", ge=-200, le=200)
     over_s: Positive = key(3600.0, "within which time, s of cell time; then it stays as warm")
+    start_c: InRange = key(
+        20.0, 'temperature at the start, deg C, as thermometers with path = "simulated" show it'
+    )
+    legs_share: SixAlike = key(1.0, "share of the rise that each leg takes", validate_default=True)
     expansion_base_um_m_k: NotNegative = key(
         11.5, "thermal expansion of the base with the scales of linear encoders, um/m/K"
     )

@@ -50,6 +50,8 @@ SIZES_OF_GRADES: Mapping[Grade, Mapping[str, float]] = {
         "ball_roundness_um": 0.0,
         "temperature_at_work_k": 0.0,
         "temperature_measuring_k": 0.0,
+        "thermometers_k": 0.0,
+        "expansion_percent": 0.0,
         "load_n": 0.0,
     },
 }
@@ -89,11 +91,17 @@ class CommonUncertaintySettings(Section):
         1.0,
         "change of the temperature while measuring, K; a run with thermometers takes their range instead",
     )
+    thermometers_k: NotNegative = key(
+        0.3, "uncertainty of the temperatures of legs by their thermometers, K; DS18B20: +-0.5 at most"
+    )
     expansion_base_um_m_k: NotNegative = key(
         23.0, "thermal expansion of the base with its scales, um/m/K: aluminium 23, steel 11.5, granite 6"
     )
     expansion_platform_um_m_k: NotNegative = key(23.0, "thermal expansion of the platform, um/m/K")
-    expansion_legs_um_m_k: NotNegative = key(23.0, "thermal expansion of the legs, um/m/K")
+    expansion_legs_um_m_k: NotNegative = key(
+        23.0, "thermal expansion of the legs, um/m/K; taken out of the records where they have thermometers"
+    )
+    expansion_percent: NotNegative = key(10.0, "uncertainty of these, %")
     load_n: NotNegative = key(20.0, "force on the tool at work in each direction, N")
     leg_compliance_um_n: NotNegative = key(0.03, "compliance of a leg with its joints, um/N")
     own_weight_n: NotNegative = key(
@@ -253,6 +261,13 @@ class ModelSettings(Section):
         ("backlash", "play", "compliance"),
         "terms that records are searched for; compliance with uncertainty.own_weight_n only; [] for none",
         max_length=3,
+    )
+    temperature_c: InRange | None = key(
+        None,
+        "temperature at which the geometry is sought, where legs have thermometers, deg C; by default that "
+        "of each at the first record of the first point",
+        ge=-100,
+        le=300,
     )
     backlash: Positive = key(
         0.1, "what the backlash of a joint may be, 1 sigma before measuring", alias="backlash_mm"

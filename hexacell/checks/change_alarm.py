@@ -12,23 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexacell.cell.fields import Frozen
+from hexacell.cell.model import CellSettings
 from hexacell.checks.check import Check
 from hexacell.drift.run_evidence import Causes, WhitenedRecords, whiten_records
 from hexacell.drift.single_cause import SingleCauseTest, possible_legs, single_cause_test
 from hexacell.identification.problem.prior import IdentifiedBefore
-from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import free_parameter_derivatives
-from hexacell.kinematics.parameters import MachinePart
 from hexacell.kinematics.rotations import Array
-from hexacell.measurements.records import MeasurementSet
+from hexacell.measurements.records import MEASURED_PARTS, MeasurementSet, Temperatures
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.effects import Effect, Occurrence, errors_by_effects
 
 FIRST_RECORDS = 8
 """Number of a check's first records that are tested, references included."""
-
-UM_PER_M = 1e-6
-"""A relative expansion of 1 um/m."""
 
 
 class ChangeAlarm(Frozen):
@@ -57,25 +53,25 @@ class ChangeAlarm(Frozen):
 
 
 def change_alarm(
-    check: Check, measurements: MeasurementSet, warmer: Array | None = None
+    check: Check, measurements: MeasurementSet, before_c: Temperatures = ()
 ) -> ChangeAlarm | None:
     """Whether the first records raise an alarm, and which leg all of them name.
 
-    Records that the others prove false are not tested. ``warmer`` (n, 6), K, is how much warmer the legs
-    were at each record than at the result before. Where that is not known (NaN) no test is possible.
+    Records that the others prove false are not tested. ``before_c`` are the temperatures, deg C, of legs
+    and base at the result before. No test is possible where one that has a temperature now had none.
     """
     before, false = check.before, check.false_records(measurements)
     sound = [row for row, one in enumerate(measurements.records) if one.id not in false]
     if before is None or len(sound) < FIRST_RECORDS:
         return None
-    expansion = None
-    if warmer is not None and warmer.any():
-        if np.isnan(warmer).any():
-            return None
-        by_kelvin = check.settings.uncertainty.expansion_legs_um_m_k
-        expansion = leg_expansion(check.robot.commanding, by_kelvin, warmer)
-    first, _ = _single_causes(check, before, measurements, sound[:FIRST_RECORDS], expansion)
-    every, legs = _single_causes(check, before, measurements, sound, expansion)
+    reference = (*before_c, *(None,) * MEASURED_PARTS)[:MEASURED_PARTS]
+    expansion = replace(check.robot.expansion, reference_c=reference)
+    has_new_part = expansion.referred_to(measurements) != expansion
+    if has_new_part or has_silent_leg(check.settings, measurements):
+        return None
+    check = replace(check, robot=replace(check.robot, expansion=expansion))
+    first, _ = _single_causes(check, before, measurements, sound[:FIRST_RECORDS])
+    every, legs = _single_causes(check, before, measurements, sound)
     leg = possible_legs(every.scores, every.sigmas, legs)[0]
     cause = int(np.where(legs == leg, np.abs(every.scores), -1.0).argmax())
     parameter = check.robot.mechanism.parameters.parameters[cause]
@@ -91,32 +87,30 @@ def change_alarm(
     )
 
 
+def has_silent_leg(settings: CellSettings, measurements: MeasurementSet) -> bool:
+    """Whether a leg with a thermometer has no temperature at any of some records."""
+    shown = np.logical_or.reduce(np.isfinite(measurements.temperatures), axis=0)
+    return not all(shown[leg - 1] for one in settings.thermometers for leg in one.legs)
+
+
 def _single_causes(
-    check: Check,
-    before: IdentifiedBefore,
-    measurements: MeasurementSet,
-    rows: list[int],
-    expansion: Array | None,
+    check: Check, before: IdentifiedBefore, measurements: MeasurementSet, rows: list[int]
 ) -> tuple[SingleCauseTest, NDArray[np.int_]]:
     """The test of a change of each parameter by some of the records, and the legs of the parameters."""
-    robot, by_row = check.robot, None if expansion is None else expansion[rows]
+    robot = check.robot
     some = MeasurementSet(tuple(measurements.records[row] for row in rows))
-    records = machine_records(robot, some, robot.free_parameters, by_row)
+    records = machine_records(robot, some, robot.free_parameters)
     causes = machine_causes(robot, len(records.state))
     covariance = _state_covariance(before.covariance, robot.effects, check.earlier, len(records.state))
     return single_cause_test(records, covariance, causes.by_state), causes.legs
 
 
-def machine_records(
-    robot: Robot, measurements: MeasurementSet, free: Array, expansion: Array | None = None
-) -> WhitenedRecords:
+def machine_records(robot: Robot, measurements: MeasurementSet, free: Array) -> WhitenedRecords:
     """The records of a run at the free parameters (p,), with what differs from run to run as noise."""
     own = tuple(one for one in robot.effects if one.occurrence is Occurrence.MEASURING)
     shared = tuple(one for one in robot.effects if one.occurrence is not Occurrence.MEASURING)
     problem = replace(robot.problem(measurements), systematic=partial(errors_by_effects, shared))
-    order = np.argsort(measurements.group, kind="stable")
-    by_row = None if expansion is None else expansion[order]
-    return whiten_records(problem, free, of_this_run=partial(errors_by_effects, own), expansion=by_row)
+    return whiten_records(problem, free, of_this_run=partial(errors_by_effects, own))
 
 
 def machine_causes(robot: Robot, states: int) -> Causes:
@@ -144,12 +138,3 @@ def _state_covariance(
     causes = np.eye(states - free)
     both = np.block([[covariance + moved @ moved.T, -moved], [-moved.T, causes]])
     return np.asarray(both)
-
-
-def leg_expansion(geometry: Geometry, um_per_m_k: float, warmer: Array) -> Array:
-    """By how much the parameters (n, P) differ where legs are ``warmer`` (n, 6), K, than in a geometry."""
-    parameters = geometry.parameters
-    of_legs = np.array([one.kind.part is MachinePart.LEGS for one in parameters.parameters])
-    legs = np.array([one.leg for one in parameters.parameters])
-    by_kelvin = np.where(of_legs, UM_PER_M * um_per_m_k * geometry.vector, 0.0)
-    return np.asarray(warmer[:, legs - 1] * by_kelvin)

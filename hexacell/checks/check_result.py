@@ -10,7 +10,6 @@ from hexacell.cell.fields import Frozen
 from hexacell.checks.change_alarm import ChangeAlarm, change_alarm
 from hexacell.checks.check import Check
 from hexacell.identification.diagnostics.tolerance_check import SIGNIFICANT_SIGMAS
-from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, RecordId
 from hexacell.results.result import AcceptedResult
 from hexacell.uncertainty.effects import Effect
@@ -67,16 +66,11 @@ class CheckResult(Frozen):
 
 
 def check_result(
-    check: Check,
-    measurements: MeasurementSet,
-    earlier: AcceptedResult | None,
-    effects: tuple[Effect, ...],
-    warmer: Array | None = None,
+    check: Check, measurements: MeasurementSet, earlier: AcceptedResult | None, effects: tuple[Effect, ...]
 ) -> CheckResult:
     """The result of a check that has ended.
 
-    ``earlier`` is what it started from; ``effects`` are the systematic ones. ``warmer`` (n, 6), K, is each
-    leg at each record than at ``earlier``; NaN where that is not known: then no change is looked for.
+    ``earlier`` is what it started from; ``effects`` are the systematic ones.
 
     Raises:
         IdentifiabilityError: the records do not belong to this robot.
@@ -104,7 +98,7 @@ def check_result(
         drift_scale=stated.drift_scale,
         changes=tuple(_changes(stated.estimate)),
         left_out=tuple(sorted(check.false_records(measurements))),
-        alarm=change_alarm(check, measurements, warmer),
+        alarm=change_alarm(check, measurements, () if earlier is None else earlier.leg_temperatures_c),
     )
 
 

@@ -83,11 +83,7 @@ def _carried_out(options: argparse.Namespace, typed: Sequence[str], console: Con
 
 
 def _require_usable(typed: Sequence[str]) -> None:
-    """Refuse arguments that could not even be the name of a file.
-
-    Raises:
-        UsageError: one is too long, or has characters that no file name has.
-    """
+    """Refuse arguments that are too long or have characters to be even the name of a file."""
     for argument in typed:
         try:
             parts = os.fsencode(argument).split(b"/")

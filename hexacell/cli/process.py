@@ -28,9 +28,6 @@ STOP_SIGNALS = tuple(
 )
 """Sent by a service manager, or when the terminal is closed. Windows has no SIGHUP."""
 
-ANYWHERE = {"completion.main"}
-"""Commands that work on any system, by module and function."""
-
 OVER_A_SOCKET = {"tui.main", "host.main"}
 """Commands that run, or reach, a run in another process."""
 
@@ -91,16 +88,15 @@ def _keep(error: Exception, typed: Sequence[str]) -> Path:
 
 
 def require_platform(target: str) -> None:
-    """Refuse a command that this operating system cannot carry out; imports nothing of it.
+    """Refuse a command, by module and function, that this operating system cannot carry out.
 
-    Args:
-        target: the command, by module and function in ``hexacell.cli.commands``.
+    Nothing of it is imported.
 
     Raises:
         UsageError: it has no POSIX locks and terminals (Windows), or does not report who is at the other
             end of a local socket as Linux does (macOS).
     """
-    if target not in ANYWHERE and find_spec("fcntl") is None:
+    if target != "completion.main" and find_spec("fcntl") is None:
         raise UsageError(
             "this system has no POSIX file locks, terminals and signals, by which hexacell protects a cell",
             action="Use Linux; on Windows install it there with `wsl --install`",

@@ -93,13 +93,9 @@ class SignalCommands:
 
 
 class KeyboardCommands:
-    """Turns typed letters into commands; listens to the engine to know which set they refer to.
+    """Turns letters that are typed into commands; listens to the engine to know which set they refer to.
 
-    Args:
-        console: where the letters are explained.
-        put: takes the commands.
-        terminal: the stream of what is typed.
-        answers: further letters, each with the function that prints an answer.
+    ``put`` takes the commands. ``answers`` are further letters, each with what prints an answer.
     """
 
     def __init__(

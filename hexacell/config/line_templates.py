@@ -13,8 +13,6 @@ places of their numbers:
 Blanks in a template stand for any blanks, two braces for one. Each line must be in the config once.
 """
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping

@@ -12,8 +12,6 @@ A key that is absent has its default. What is written are the numbers that chang
 added to the table, and a table that is absent at the end of the file.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from math import hypot
@@ -89,15 +87,14 @@ def validated(document: TomlDocument, model: type[Model]) -> Model:
         raise min(errors.values(), key=lambda error: error.line or 0) from refusal
 
 
-def read_corrections(document: TomlDocument) -> Corrections:
-    """The corrections in a document; raises ``FileError`` with the line of what is wrong."""
-    return Corrections(**validated(document, WithCorrections).corrections.model_dump())
-
-
 def with_corrections(text: str, corrections: Corrections) -> str:
     """``text`` with these corrections; raises ``FileError`` where it holds what is no correction."""
     document = TomlDocument.parse(text)
-    before, tokens, added = read_corrections(document), dict[KeyPath, str](), dict[str, str]()
+    before, tokens, added = (
+        validated(document, WithCorrections).corrections,
+        dict[KeyPath, str](),
+        dict[str, str](),
+    )
     for key in TomlCorrections.model_fields:
         old, new = _numbers(before, key), _numbers(corrections, key)
         decimals = DECIMALS_OF_DIRECTION if key == "weight_direction" else DECIMALS
@@ -119,7 +116,7 @@ def with_corrections(text: str, corrections: Corrections) -> str:
     return _with_keys(document.replaced(tokens), added)
 
 
-def _numbers(corrections: Corrections, key: str) -> tuple[float, ...]:
+def _numbers(corrections: Corrections | TomlCorrections, key: str) -> tuple[float, ...]:
     value = getattr(corrections, key)
     return () if value is None else tuple(value) if isinstance(value, tuple) else (value,)
 

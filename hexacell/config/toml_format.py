@@ -14,12 +14,9 @@ and ``[corrections]`` (:mod:`~hexacell.config.toml_corrections`). The file belon
 write-back changes the numbers of the geometry and of the corrections, and no other character.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from types import MappingProxyType
 from typing import Annotated, Any
 
 import numpy as np
@@ -48,11 +45,7 @@ class NativeToml:
     holds = frozenset(CorrectionKind)
 
     def __init__(
-        self,
-        parameters: ParameterSet,
-        given: Mapping[str, Any] = MappingProxyType({}),
-        *,
-        is_part: bool = False,
+        self, parameters: ParameterSet, given: Mapping[str, Any], *, is_part: bool = False
     ) -> None:
         if given:
             raise UsageError(
@@ -115,7 +108,7 @@ class NativeToml:
 
 def native_layout(parameters: ParameterSet) -> ConfigLayout:
     """The layout of a config that is one file in this format."""
-    return ConfigLayout(parameters, (FormatOfFile("toml", NativeToml(parameters)),))
+    return ConfigLayout(parameters, (FormatOfFile("toml", NativeToml(parameters, {})),))
 
 
 def _geometry(parameters: ParameterSet, content: Mapping[str, Any]) -> Geometry:
@@ -169,5 +162,4 @@ def _model(parameters: ParameterSet, *, branch_on_top: bool, has_ranges: bool) -
         place["branch"] = (Signs, key(..., "six signs: the solution of the inverse kinematics of each leg"))
     if geometry:
         whole["geometry"] = (create_model("Geometry", __base__=OfOwner, **geometry), ...)
-    made: type[WithCorrections] = create_model("NativeConfig", __base__=WithCorrections, **whole)
-    return made
+    return create_model("NativeConfig", __base__=WithCorrections, **whole)

@@ -134,8 +134,7 @@ def _by_parameters(example: MechanismExample, basis: Array) -> Array:
         unseen = np.concatenate([unseen, larger[..., None]], axis=-1)
     frames, _ = np.linalg.qr((weights * unseen).reshape(-1, unseen.shape[-1]))
     left = columns - frames @ (frames.T @ columns)
-    sizes: Array = np.linalg.svd(left, compute_uv=False)
-    return sizes
+    return np.linalg.svd(left, compute_uv=False)
 
 
 def _error(found: Identification, truth: Array) -> tuple[int, float]:

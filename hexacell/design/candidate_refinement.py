@@ -92,7 +92,7 @@ class CandidateSpace:
         records, clear = predict_clear_records(belief, zero, targets, self._mode)
         if not clear.any():
             return None
-        records = records[clear & records.stay_inside(belief.limits)]
+        records = records[clear & records.within(belief.limits)]
         return RatedRecords(records, self.gain(records))
 
     def refined(self, candidates: RatedRecords, rounds: Rounds) -> RatedRecords:

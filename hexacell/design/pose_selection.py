@@ -117,7 +117,7 @@ def select_from_list(
     belief = planner.belief
     targets, rows = outcomes_of(belief, commands)
     records = predict_records(belief, zero, targets)
-    inside = np.flatnonzero(records.stay_inside(belief.limits))[skipped:]
+    inside = np.flatnonzero(records.within(belief.limits))[skipped:]
     search = _PathSearch(TravelConstraint(belief, zero), planner)
     no_preference = np.full(len(inside), np.inf)
     selected = search.first_of_few(records[inside], commands[rows[inside]], no_preference)

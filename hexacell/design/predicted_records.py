@@ -150,17 +150,8 @@ class PredictedRecords(Batch):
     sigma: Array
     chance: Array
 
-    @property
-    def shown_sigma(self) -> Array:
-        """Standard deviations (n, 3), mm, of what the gauges will show."""
-        return np.hypot(self.sigma, self.chance)
-
-    def stay_inside(self, limits: Limits) -> Mask:
-        """Which deviations surely stay inside the gauges' room, by linear propagation."""
-        return self.within(limits, TRAVEL_SHARE)
-
-    def within(self, limits: Limits, share: float) -> Mask:
-        """Which deviations stay within a share of the gauges' room, with four sigma.
+    def within(self, limits: Limits, share: float = TRAVEL_SHARE) -> Mask:
+        """Which deviations stay within a share of the gauges' room, with four sigma, by linear propagation.
 
         As far as chance goes they are almost surely inside as well.
         """

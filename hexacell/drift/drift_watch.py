@@ -12,8 +12,6 @@ After an alarm the step is located, what was known of the legs that it may be of
 and the sums begin anew. A leg that moves on alarms again, by what it has moved since.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache

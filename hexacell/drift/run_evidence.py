@@ -42,7 +42,6 @@ from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.linear_model import systematic_errors
 from hexacell.identification.solver.measurement_model import NuisanceElimination, predict
 from hexacell.kinematics.rotations import Array
-from hexacell.kinematics.sensitivity import POSITION, pose_sensitivity
 
 DIFFUSE = 1e2
 """Standard deviation of a free parameter of which nothing is known, mm or rad."""
@@ -105,11 +104,7 @@ class WhitenedRecords:
 
 
 def whiten_records(
-    problem: Problem,
-    free: Array,
-    *,
-    of_this_run: SystematicModel = no_systematic_errors,
-    expansion: Array | None = None,
+    problem: Problem, free: Array, *, of_this_run: SystematicModel = no_systematic_errors
 ) -> WhitenedRecords:
     """The records of a problem that have a pose under the geometry of ``free`` parameters (p,), mm.
 
@@ -117,17 +112,11 @@ def whiten_records(
         problem: its systematic errors are those that all runs of the machine share.
         free: where to linearize, near the truth.
         of_this_run: systematic errors that are others in each run.
-        expansion: (n, P), by how much the parameters of the machine differ at each record from those that
-            are sought, as by the temperature of the legs.
     """
     solved = problem.solve_poses(free)
     kept = problem.subset(solved.found)
     prediction = predict(kept, free, solved.poses[np.flatnonzero(solved.found)])
     residuals = prediction.residuals
-    if expansion is not None:
-        at = problem.mechanism, problem.geometry(prediction.free), prediction.poses, kept.joints
-        by_parameters = pose_sensitivity(*at, POSITION).parameters
-        residuals = residuals + np.einsum("nip,np->ni", by_parameters, expansion[solved.found])
     shared = systematic_errors(kept, prediction)
     own = systematic_errors(replace(kept, systematic=of_this_run), prediction)
     weights = np.linalg.inv(np.linalg.inv(prediction.weights) + shared.own + own.own)
@@ -146,8 +135,7 @@ def _whitened(causes: Array, values: Array) -> Array:
     factor = np.linalg.cholesky(np.eye(len(causes)) + causes @ causes.T)
     from scipy.linalg import solve_triangular  # noqa: PLC0415 - a tenth of a second
 
-    whitened: Array = solve_triangular(factor, values, lower=True)
-    return whitened
+    return solve_triangular(factor, values, lower=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -163,8 +151,7 @@ class CarriedPosterior(RunEvidence):
     @property
     def state(self) -> Array:
         """The estimate (s,)."""
-        found: Array = np.linalg.solve(self.information, self.weighted)
-        return found
+        return np.linalg.solve(self.information, self.weighted)
 
     def after(self, *runs: RunEvidence) -> CarriedPosterior:
         """The posterior with some more runs."""

@@ -72,11 +72,13 @@ class RecordPlacement(Placement):
         deviations: (n, 3), mm, along the base axes.
         gauges: (3, 3), columns: measuring directions of the gauges.
         directions: (n, 6) from which side each joint arrived, 1 or -1; 0 where that is not known.
+        warmer: (n, 7), K, legs and base than the geometry's; what that does is not in the joint variables.
     """
 
     deviations: Array
     gauges: Array
     directions: Array
+    warmer: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -28,14 +28,6 @@ class CorrectionKind(StrEnum):
     COMPLIANCE = "compliance"
 
 
-class CorrectionNumber(NamedTuple):
-    """One number of the corrections, as people call it."""
-
-    name: str
-    unit: str
-    value: float
-
-
 class CorrectionChange(NamedTuple):
     """One number of the corrections that changes; 0 where it was not, or is no longer, stated."""
 
@@ -86,27 +78,26 @@ class Corrections:
             backlash, play_mm, compliance, weight.weight_n, weight.weight_direction, weight.weight_centre_mm
         )
 
-    def numbers(self, joint_unit: JointUnit) -> Iterator[CorrectionNumber]:
-        """All of them, each as "backlash of joint 3"; the weight's centre only where it is stated."""
+    def numbers(self, joint_unit: JointUnit) -> Iterator[tuple[str, str, float]]:
+        """Name, as "backlash of joint 3", unit and value of all; the weight's centre only where stated."""
         mm, no_unit = str(ParameterUnit.MM), str(ParameterUnit.NONE)
         units = {CorrectionKind.BACKLASH: str(joint_unit), CorrectionKind.PLAY: mm}
         for kind in CorrectionKind:
             part = "joint" if kind is CorrectionKind.BACKLASH else "leg"
             for number, value in enumerate(self.of(kind), start=1):
-                yield CorrectionNumber(f"{kind} of {part} {number}", units.get(kind, "um/N"), value)
-        yield CorrectionNumber("weight", "N", self.weight_n)
+                yield f"{kind} of {part} {number}", units.get(kind, "um/N"), value
+        yield "weight", "N", self.weight_n
         for axis, value in zip("xyz", self.weight_direction, strict=True):
-            yield CorrectionNumber(f"weight's direction {axis}", no_unit, value)
+            yield f"weight's direction {axis}", no_unit, value
         for axis, value in zip("xyz", self.weight_centre_mm or (), strict=False):
-            yield CorrectionNumber(f"weight's centre {axis}", mm, value)
+            yield f"weight's centre {axis}", mm, value
 
     def changes_to(self, after: Corrections, joint_unit: JointUnit) -> tuple[CorrectionChange, ...]:
         """The numbers that are others in ``after``."""
-        old, new = ({one.name: one for one in which.numbers(joint_unit)} for which in (self, after))
-        found: list[CorrectionChange] = []
-        for name, one in (old | new).items():
-            pair = (which[name].value if name in which else 0.0 for which in (old, new))
-            found.append(CorrectionChange(name, one.unit, *pair))
+        every = [*self.numbers(joint_unit)], [*after.numbers(joint_unit)]
+        old, new = ({name: value for name, _, value in numbers} for numbers in every)
+        units = {name: unit for numbers in every for name, unit, _ in numbers}
+        found = (CorrectionChange(one, units[one], old.get(one, 0.0), new.get(one, 0.0)) for one in units)
         return tuple(one for one in found if one.before != one.after)
 
 

@@ -52,8 +52,7 @@ class Legs:
     def directions(self) -> Array:
         """Unit vectors (n, 6, 3) from the platform to the base, in the base frame."""
         vectors = self.base_joints - self.platform_joints
-        directions: Array = vectors / np.sqrt(_dot(vectors, vectors))[..., None]
-        return directions
+        return vectors / np.sqrt(_dot(vectors, vectors))[..., None]
 
     @property
     def directions_in_carriers(self) -> Array:
@@ -99,8 +98,7 @@ def segment_distances(start: Array, end: Array, other_start: Array, other_end: A
     # The nearest point of the first segment to that of the other one, which may be its end.
     first = _clipped((b * second - c) / a, 0.0, 1.0)
     apart = between + first * along - second * other
-    distances: Array = np.sqrt(_product(apart, apart))
-    return distances
+    return np.sqrt(_product(apart, apart))
 
 
 def _product(one: Array, other: Array) -> Array:

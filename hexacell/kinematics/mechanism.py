@@ -1,7 +1,5 @@
 """The interface of a mechanism: one constraint per leg, its derivatives, and its frames."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal, Protocol
@@ -232,8 +230,7 @@ def joint_zeros(mechanism: Mechanism, geometry: Geometry) -> Array:
     A joint variable and the zero together are what does not depend on the encoder: the whole length of a
     Gough-Stewart platform's leg, the place of a slider in the base frame.
     """
-    zeros: Array = mechanism.encoder_zeros(geometry).T @ geometry.vector
-    return zeros
+    return mechanism.encoder_zeros(geometry).T @ geometry.vector
 
 
 def inverse_kinematics(mechanism: Mechanism, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:

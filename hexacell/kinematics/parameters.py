@@ -208,8 +208,7 @@ class ParameterSet:
 
     def of_every_leg(self, values: Array) -> Array:
         """The vector in which every leg has the same numbers (c,), in the order of the kinds."""
-        repeated: Array = np.tile(values, LEGS)[self.leg_order]
-        return repeated
+        return np.tile(values, LEGS)[self.leg_order]
 
     def by_kind(self, values: Mapping[str, float]) -> Array:
         """The vector in which all parameters of a kind have the value under its symbol."""

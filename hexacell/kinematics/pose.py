@@ -152,8 +152,7 @@ class PoseBatch(Batch):
     def turns(self) -> Array:
         """Angles (n,), rad, in (-pi, pi], by which the platform is turned about its normal, then tilted."""
         r = self.rotations
-        turns: Array = np.arctan2(r[:, 1, 0] - r[:, 0, 1], r[:, 0, 0] + r[:, 1, 1])
-        return turns
+        return np.arctan2(r[:, 1, 0] - r[:, 0, 1], r[:, 0, 0] + r[:, 1, 1])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

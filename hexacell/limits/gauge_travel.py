@@ -47,8 +47,7 @@ class GaugeRoom:
         """Which deviations (..., 3), with a spread to both sides, stay within a share of the room."""
         above = deviations + spread <= share * np.array(self.upper)
         below = deviations - spread >= share * np.array(self.lower)
-        within: Mask = np.asarray((above & below).all(axis=-1))
-        return within
+        return np.asarray((above & below).all(axis=-1))
 
     def widened(self, margin_mm: float) -> GaugeRoom:
         """This room with a margin on all sides."""

@@ -154,8 +154,7 @@ class Limits:
 
     def orientations(self, turns: Array) -> Array:
         """Turns (n, 3, 3) of a level platform, as orientations in the convention's frames."""
-        turned: Array = self.frames.base @ turns @ self.frames.platform.T
-        return turned
+        return self.frames.base @ turns @ self.frames.platform.T
 
     def allow_commands(self, poses: PoseBatch) -> Mask:
         """Which of n commands in the convention's frames keep tilt, turn and axes."""

@@ -3,7 +3,8 @@
 One row per record, with the header ``point,orientation,x,y,z,a,b,c,q1,...,q6,dx,dy,dz``: the pose as
 commanded, mm and deg, the joint variables by the encoders, mm or deg as the mechanism has them, and the
 deviation from the point's first row, mm. There may also be ``d1,...,d6``: whether each joint last moved up,
-1, or down, -1; 0 or empty where that is not known. The order of the columns is free; others are ignored.
+1, or down, -1; 0 or empty where that is not known; and some of ``t1,...,t6,tb``: the temperatures of
+legs and base, deg C; empty where not known. The order of the columns is free; others are ignored.
 """
 
 import csv
@@ -16,7 +17,7 @@ from pathlib import Path
 from hexacell.cell.fields import LARGEST_NUMBER
 from hexacell.errors import FileError
 from hexacell.kinematics.pose import Pose
-from hexacell.measurements.records import Directions, MeasurementSet, Record, RecordId
+from hexacell.measurements.records import Directions, MeasurementSet, Record, RecordId, Temperatures
 from hexacell.storage.atomic_files import read_text, write_atomically
 from hexacell.storage.toml_document import shortened
 
@@ -26,6 +27,9 @@ HEADER = (*COUNTS, *NUMBERS)
 POSE_HEADER = HEADER[:8]
 DIRECTIONS = ("d1", "d2", "d3", "d4", "d5", "d6")
 """Columns of a file with records of which it is known from which side joints arrived."""
+
+TEMPERATURES = ("t1", "t2", "t3", "t4", "t5", "t6", "tb")
+"""Columns of a file with records of which it is known how warm legs and base were."""
 
 LARGEST_COUNT = 1_000_000
 MOST_RECORDS = 2000
@@ -77,14 +81,17 @@ def write_measurements(path: Path, measurements: MeasurementSet) -> None:
     """Write a measurement file, in one step; every number reads back exactly."""
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
-    further = DIRECTIONS if any(one.directions for one in measurements.records) else ()
-    rows.writerow([*HEADER, *further])
+    arrived = DIRECTIONS if any(one.directions for one in measurements.records) else ()
+    warm = TEMPERATURES if any(one.temperatures for one in measurements.records) else ()
+    rows.writerow([*HEADER, *arrived, *warm])
     for one in measurements.records:
         numbers = (*one.pose.as_tuple(), *one.joints, *one.deviation)
-        directions = one.directions or ("",) * len(further)
+        directions = one.directions or ("",) * len(arrived)
+        shown = one.temperatures or (None,) * len(warm)
         # float(): the repr of a numpy number contains its type.
         cells = (repr(float(number)) for number in numbers)
-        rows.writerow([one.point, one.orientation, *cells, *directions])
+        temperatures = ("" if celsius is None else repr(float(celsius)) for celsius in shown)
+        rows.writerow([one.point, one.orientation, *cells, *directions, *temperatures])
     write_atomically(path, text.getvalue().encode())
 
 
@@ -92,8 +99,10 @@ def _records(path: Path, text: str, wanted: tuple[str, ...]) -> dict[RecordId, t
     """The records, each with its line, in the order of the file; ``wanted`` are the first of ``HEADER``."""
     rows = _filled_rows(path, text)
     line, header = next(rows, (1, []))
-    if wanted == HEADER and any(name.strip() in DIRECTIONS for name in header):
-        wanted = (*HEADER, *DIRECTIONS)
+    if wanted == HEADER:
+        names = {name.strip() for name in header}
+        arrived = DIRECTIONS if names.intersection(DIRECTIONS) else ()
+        wanted = (*HEADER, *arrived, *(name for name in TEMPERATURES if name in names))
     columns = _columns(path, line, header, wanted)
     found: dict[RecordId, tuple[int, Record]] = {}
     for line, row in rows:
@@ -159,7 +168,8 @@ def _record(path: Path, line: int, cells: Mapping[str, str]) -> Record:
     point, orientation = int(numbers[0]), int(numbers[1])
     q1, q2, q3, q4, q5, q6, dx, dy, dz = numbers[8:]
     joints, directions = (q1, q2, q3, q4, q5, q6), _directions(path, line, cells)
-    return Record(point, orientation, Pose(*numbers[2:8]), joints, (dx, dy, dz), directions)
+    temperatures = _temperatures(path, line, cells)
+    return Record(point, orientation, Pose(*numbers[2:8]), joints, (dx, dy, dz), directions, temperatures)
 
 
 def _directions(path: Path, line: int, cells: Mapping[str, str]) -> Directions:
@@ -170,6 +180,13 @@ def _directions(path: Path, line: int, cells: Mapping[str, str]) -> Directions:
             problem = f'{name} is "{shortened(cell)}", but must be 1, -1, 0 or empty'
             raise FileError(problem, subject=path, line=line, action="Correct this cell")
     return tuple(int(cell or 0) for cell in stated) if any(stated) else ()
+
+
+def _temperatures(path: Path, line: int, cells: Mapping[str, str]) -> Temperatures:
+    """How warm legs and base were; empty if no cell says it."""
+    stated = [(name, cells.get(name, "").strip()) for name in TEMPERATURES]
+    shown = tuple(_number(path, line, name, cell) if cell else None for name, cell in stated)
+    return shown if any(cell for _, cell in stated) else ()
 
 
 def _number(path: Path, line: int, name: str, cell: str) -> float:

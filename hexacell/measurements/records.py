@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar
@@ -20,6 +20,11 @@ Joints = tuple[float, float, float, float, float, float]
 Deviation = tuple[float, float, float]
 Directions = tuple[int, ...]
 """Whether each joint last moved up, 1, or down, -1; 0 where that is not known."""
+
+Temperatures = tuple[float | None, ...]
+"""Of legs 1 to 6 and of the base, deg C; None of what is not known; empty where nothing is."""
+
+MEASURED_PARTS = 7
 
 RecordId = tuple[int, int]
 """Point and orientation of a record, as the user counts them."""
@@ -48,6 +53,7 @@ class Record:
         joints: joint variables q1 to q6 from the encoders, mm or deg.
         deviation: of the ball from its position when the gauges were zeroed, along base x, y, z, mm.
         directions: from which side each joint arrived; empty where nothing is known of that.
+        temperatures: of legs and base.
     """
 
     point: int
@@ -56,6 +62,7 @@ class Record:
     joints: Joints
     deviation: Deviation
     directions: Directions = ()
+    temperatures: Temperatures = ()
 
     @property
     def id(self) -> RecordId:
@@ -136,6 +143,17 @@ class MeasurementSet:
         unknown = (0,) * 6
         rows = [record.directions or unknown for record in self.records]
         return _frozen(np.array(rows, dtype=float).reshape(-1, 6))
+
+    @cached_property
+    def temperatures(self) -> Array:
+        """The temperatures of legs and base (n, 7), deg C; NaN where one is not known."""
+        return _frozen(temperatures_of(record.temperatures for record in self.records))
+
+
+def temperatures_of(rows: Iterable[Temperatures]) -> Array:
+    """Temperatures of legs and base as an array (n, 7), deg C; NaN where one is not known."""
+    known = [[*row, *[None] * MEASURED_PARTS][:MEASURED_PARTS] for row in rows]
+    return np.array(known, dtype=float).reshape(-1, MEASURED_PARTS)
 
 
 def _frozen(array: NDArray[Scalar]) -> NDArray[Scalar]:

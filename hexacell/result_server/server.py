@@ -12,7 +12,7 @@ import hmac
 import logging
 import os
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import astuple, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -92,9 +92,7 @@ class Reader:
         return User(role=UserRole.User) if is_reader else None
 
 
-def allowed_reader(
-    settings: OpcUaSettings, folder: Path, environment: Mapping[str, str] = os.environ
-) -> Reader:
+def allowed_reader(settings: OpcUaSettings, folder: Path) -> Reader:
     """Who may read; ``folder`` has the cell file.
 
     Raises:
@@ -102,7 +100,7 @@ def allowed_reader(
         UsageError: nobody is named, and the cell file does not let anybody in; or a variable is too long.
     """
     file = None if settings.password_file is None else folder / settings.password_file
-    found = stated_secrets(file, ReaderFile, VARIABLES, environment)
+    found = stated_secrets(file, ReaderFile, VARIABLES, os.environ)
     if len(found) == len(VARIABLES):
         return Reader(**{name: value.get_secret_value() for name, value in found.items()})
     if settings.anonymous:
@@ -149,11 +147,8 @@ def _made_certificate(uri: str, host: str) -> tuple[bytes, bytes]:
 class ResultNodes:
     """The results of one cell in the address space of a server."""
 
-    def __init__(self, namespace: int, management: Node, results: Node, event: EventGenerator) -> None:
-        self._namespace = namespace
-        self._management = management
-        self._results = results
-        self._event = event
+    def __init__(self, namespace: int, results: Node, event: EventGenerator) -> None:
+        self._namespace, self._results, self._event = namespace, results, event
         self._shown: deque[Node] = deque()
 
     @classmethod
@@ -167,7 +162,7 @@ class ResultNodes:
         management = await of_cell.add_object(namespace, "ResultManagement")
         results = await management.add_folder(namespace, "Results")
         event = await server.get_event_generator(event_type, emitting_node=management.nodeid)
-        return cls(namespace, management, results, event)
+        return cls(namespace, results, event)
 
     async def show(self, result: PublishedResult) -> None:
         """Add a result as the newest; the oldest goes where there are too many."""

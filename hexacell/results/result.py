@@ -20,9 +20,9 @@ from hexacell.identification.solver.result import (
     Termination,
 )
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.parameters import ParameterSet
+from hexacell.kinematics.parameters import LEGS, ParameterSet
 from hexacell.kinematics.rotations import Array
-from hexacell.measurements.records import Deviation, RecordId
+from hexacell.measurements.records import Deviation, RecordId, Temperatures
 from hexacell.results.term_result import TermResult, term_results
 from hexacell.uncertainty.statement import COVERAGE_FACTOR
 
@@ -56,7 +56,8 @@ class IdentificationResult(Frozen):
     tolerances or an earlier result determine parameters. Older journals have it for the latter only, else
     None. ``identifies`` says which parameters are identified; the others are as the controller has them,
     with their tolerances as sigma. ``terms`` are those beside the geometry that the records were searched
-    for; older journals have none.
+    for; older journals have none. ``holds_at_c`` are the temperatures of legs and base for which it does,
+    None of a part without; empty if no record has any.
     """
 
     converged: bool
@@ -77,11 +78,13 @@ class IdentificationResult(Frozen):
     noise_freedom: float | None = None
     identifies: ParameterChoice = ParameterChoice.ALL
     terms: tuple[TermResult, ...] = ()
+    holds_at_c: Temperatures = ()
 
     @classmethod
     def of(cls, found: Identification, zeros: IdentifiedZeros | None = None) -> Self:
         """The result of an identification, or of the zeros alone."""
         parameters, kept = found.geometry.parameters, zeros or found
+        holds_at = found.problem.holds_at
         return cls(
             converged=found.converged,
             termination=found.termination,
@@ -101,6 +104,7 @@ class IdentificationResult(Frozen):
             noise_freedom=None if np.isinf(found.problem.noise.freedom) else found.problem.noise.freedom,
             identifies=ParameterChoice.ALL if zeros is None else ParameterChoice.ZEROS,
             terms=term_results(found),
+            holds_at_c=holds_at if any(one is not None for one in holds_at) else (),
         )
 
     def document(self, parameters: ParameterSet) -> dict[str, Any]:
@@ -143,6 +147,15 @@ class IdentificationResult(Frozen):
     def identified(self, parameters: ParameterSet) -> Geometry:
         """The geometry in the mechanism's frame convention."""
         return Geometry.of(parameters, self.geometry)
+
+
+def legs_at(temperatures_c: Temperatures) -> str:
+    """The temperatures of legs in words: "legs at 20.0 to 21.5 deg C"; empty where none is known."""
+    known = [celsius for celsius in temperatures_c[:LEGS] if celsius is not None]
+    if not known:
+        return ""
+    lowest, highest = (f"{limit(known):.1f}" for limit in (min, max))
+    return f"legs at {lowest if lowest == highest else f'{lowest} to {highest}'} deg C"
 
 
 class ExpectedImprovement(Frozen):
@@ -215,8 +228,8 @@ class AcceptedResult(Frozen):
         effects: what one unit of each cause of a systematic effect did to the free parameters: by the
             name of the effect, a row a cause.
         length: what the length check of its run found; None without one.
-        leg_temperatures_c: mean temperature of each leg while the geometry was measured; None for
-            a leg without a thermometer that answered.
+        leg_temperatures_c: of legs, and of the base, at which the geometry holds; by older journals means
+            of legs while it was measured. None for one without a thermometer that answered.
         identified: the geometry in the mechanism's frame convention, where the controller got another one;
             None where it has this one.
         terms: those beside the geometry that the robot has.

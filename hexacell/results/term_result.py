@@ -1,7 +1,5 @@
 """What an identification found beside the geometry, as data, and what of it a controller is to correct."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 

@@ -26,6 +26,7 @@ from hexacell.identification.problem.problem import Assumptions, Problem
 from hexacell.identification.solver.result import GeometryEstimate, Identification
 from hexacell.identification.solver.term_estimates import TermEstimates
 from hexacell.identification.terms.term import ModelTerm
+from hexacell.identification.thermal_expansion import ThermalExpansion
 from hexacell.kinematics.commanded_motion import CommandedRobot, RefusedCommands
 from hexacell.kinematics.corrections import NO_CORRECTIONS, CorrectionKind, Corrections
 from hexacell.kinematics.geometry import Geometry
@@ -35,7 +36,7 @@ from hexacell.kinematics.rotations import Array
 from hexacell.limits.limits import Limits
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.same_robot import require_frames, require_same_robot
-from hexacell.robot.stated import noise_of, stated_effects, stated_limits, stated_terms
+from hexacell.robot.stated import noise_of, stated_effects, stated_expansion, stated_limits, stated_terms
 from hexacell.uncertainty.effects import Effect, errors_by_effects
 
 
@@ -65,6 +66,7 @@ class Robot:
             these that its config has a place for.
         refused: commands that the cell file excludes, and those that the controller refused in this run.
         identifies: which parameters are identified.
+        expansion: by temperature, and how warm the identified geometry is.
     """
 
     mechanism: Mechanism
@@ -89,6 +91,7 @@ class Robot:
     holds: frozenset[CorrectionKind] = frozenset()
     refused: RefusedCommands = field(default_factory=RefusedCommands)
     identifies: ParameterChoice = ParameterChoice.ALL
+    expansion: ThermalExpansion = field(default_factory=ThermalExpansion)
 
     @cached_property
     def _commanding_as_written(self) -> CommandingGeometry:
@@ -165,6 +168,7 @@ class Robot:
             travel_mm=self.limits.travels_mm,
             offered=self.terms if looks_for_terms else (),
             known_terms=self.known_terms,
+            expansion=self.expansion,
         )
         return assumptions.problem(measurements, before)
 
@@ -292,4 +296,5 @@ def make_robot(
         holds=controller.holds,
         refused=settings.excluded_commands,
         identifies=(ParameterChoice.ZEROS if settings.identification.only_zeros else ParameterChoice.ALL),
+        expansion=stated_expansion(settings),
     )

@@ -1,6 +1,6 @@
 """The noise, limits and systematic effects that a cell file states, as the mathematics has them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from functools import partial
 
@@ -23,6 +23,7 @@ from hexacell.identification.terms.backlash import backlash
 from hexacell.identification.terms.compliance import compliance
 from hexacell.identification.terms.play import play
 from hexacell.identification.terms.term import ModelTerm
+from hexacell.identification.thermal_expansion import ThermalExpansion
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import Branch, Mechanism, joint_zeros
@@ -32,6 +33,7 @@ from hexacell.kinematics.rotations import Array
 from hexacell.limits.gauge_travel import GaugeTravel
 from hexacell.limits.leg_limits import LegLimits
 from hexacell.limits.limits import AxisLimits, Limits, ZeroedRanges
+from hexacell.measurements.records import MEASURED_PARTS
 from hexacell.uncertainty.effect_kinds import (
     ball_beside_tool,
     ball_roundness,
@@ -40,6 +42,7 @@ from hexacell.uncertainty.effect_kinds import (
     common_sag,
     encoder_eccentricities,
     encoder_scales,
+    expansion_coefficients,
     gauge_scales,
     load_at_work,
     own_weight,
@@ -48,6 +51,7 @@ from hexacell.uncertainty.effect_kinds import (
     stop_repeatability,
     temperature_at_work,
     temperature_while_measuring,
+    thermometers_of_legs,
 )
 from hexacell.uncertainty.effects import Effect
 
@@ -170,7 +174,16 @@ def _unit(vectors: ArrayLike) -> Array:
     return unit
 
 
-def stated_effects(settings: CellSettings, measured_range_k: float | None = None) -> tuple[Effect, ...]:
+def stated_expansion(settings: CellSettings) -> ThermalExpansion:
+    """How the parts of a cell's robot expand, and at which temperature its geometry is sought."""
+    celsius, stated = settings.model.temperature_c, settings.uncertainty
+    by_kelvin = stated.expansion_legs_um_m_k, stated.expansion_base_um_m_k
+    return ThermalExpansion(*by_kelvin, (celsius,) * MEASURED_PARTS)
+
+
+def stated_effects(
+    settings: CellSettings, measured_range_k: float | None = None, known: Collection[MachinePart] = ()
+) -> tuple[Effect, ...]:
     """All effects that the budget of a cell has lines for, also those of size zero.
 
     Only a mechanism with rails has those of rails.
@@ -178,6 +191,7 @@ def stated_effects(settings: CellSettings, measured_range_k: float | None = None
     Args:
         settings: the cell's.
         measured_range_k: range of the temperatures read while measuring; None without thermometers.
+        known: parts whose expansion is out of the records, so that only what is not known of it acts.
     """
     stated, words, limits = settings.uncertainty, settings.mechanism.words, settings.limits
 
@@ -212,9 +226,18 @@ def stated_effects(settings: CellSettings, measured_range_k: float | None = None
         MachinePart.PLATFORM: stated.expansion_platform_um_m_k,
         MachinePart.LEGS: stated.expansion_legs_um_m_k,
     }
-    measuring = of("temperature_measuring_k", partial(temperature_while_measuring, um_per_m_k=expansion))
+    acting = {part: 0.0 if part in known else by_kelvin for part, by_kelvin in expansion.items()}
+    measuring = of("temperature_measuring_k", partial(temperature_while_measuring, um_per_m_k=acting))
     if measured_range_k is not None:
         measuring = replace(measuring, size=measured_range_k, source="thermometers")
+    legs: list[Effect] = []
+    if MachinePart.LEGS in known:
+        of_legs, of_base = expansion[MachinePart.LEGS], expansion[MachinePart.BASE]
+        coefficients = partial(expansion_coefficients, legs_um_m_k=of_legs, base_um_m_k=of_base)
+        legs = [
+            of("thermometers_k", partial(thermometers_of_legs, um_per_m_k=of_legs)),
+            of("expansion_percent", coefficients),
+        ]
     scales = gauge_scales(1e3 * settings.noise.gauge_scale, is_estimated=True)
     yields = stated.leg_compliance_um_n
     return (
@@ -224,6 +247,7 @@ def stated_effects(settings: CellSettings, measured_range_k: float | None = None
         of("ball_beside_tool_mm", ball_beside_tool),
         of("temperature_at_work_k", partial(temperature_at_work, um_per_m_k=expansion)),
         measuring,
+        *legs,
         of("load_n", partial(load_at_work, um_per_n=yields)),
         of("own_weight_n", partial(own_weight, um_per_n=yields, weight=_stated_weight(settings))),
     )

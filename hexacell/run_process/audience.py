@@ -20,17 +20,11 @@ STUCK_S = 10.0
 
 
 class Outbox:
-    """Messages to one client, in order. Of snapshots only the latest waits, and only behind all others.
+    """Messages to one client, in order. Of snapshots only the latest waits, and only behind all others."""
 
-    Args:
-        writer: the connection to the client.
-        stuck_s: how long the client may take nothing, s.
-    """
-
-    def __init__(self, writer: asyncio.StreamWriter, stuck_s: float = STUCK_S) -> None:
+    def __init__(self, writer: asyncio.StreamWriter) -> None:
         writer.transport.set_write_buffer_limits(high=0)
         self._writer = writer
-        self._stuck_s = stuck_s
         self._lines: deque[bytes] = deque()
         self._latest: bytes | None = None
         self._changed = asyncio.Event()
@@ -56,7 +50,7 @@ class Outbox:
         while (line := await self._next()) is not None:
             self._writer.write(line)
             try:
-                await asyncio.wait_for(self._writer.drain(), self._stuck_s)
+                await asyncio.wait_for(self._writer.drain(), STUCK_S)
             except TimeoutError as error:
                 self._writer.transport.abort()
                 raise ConnectionAbortedError("the client takes nothing") from error
@@ -89,7 +83,6 @@ class Audience:
         on_command: takes the commands of who is in control.
         on_control: called when somebody is in control now.
         on_leave: called when who was in control has left; with None if without a word.
-        stuck_s: how long a client may take nothing, s.
     """
 
     def __init__(
@@ -99,12 +92,10 @@ class Audience:
         on_command: Callable[[Command], None],
         on_control: Callable[[], None],
         on_leave: Callable[[messages.Leave | None], None],
-        stuck_s: float = STUCK_S,
     ) -> None:
         self.first_came = asyncio.Event()
         self._opening = opening
         self._on_command, self._on_control, self._on_leave = on_command, on_control, on_leave
-        self._stuck_s = stuck_s
         self._clients: list[_Client] = []
         self._in_control: _Client | None = None
         self._serving: set[asyncio.Task[None] | None] = set()
@@ -119,7 +110,7 @@ class Audience:
     async def serve(self, reader: StreamReader, writer: StreamWriter) -> None:
         """One connection, from its beginning to its end; that of another user is refused."""
         process, user = peer_of(writer.get_extra_info("socket"))
-        outbox = Outbox(writer, self._stuck_s)
+        outbox = Outbox(writer)
         serving = asyncio.current_task()
         self._serving.add(serving)
         try:

@@ -121,7 +121,6 @@ class HostConnection:
 
 
 def _is_ending(message: protocol.HostMessage) -> bool:
-    """Whether a message says that the run is over."""
     if isinstance(message, protocol.EventRecorded):
         return isinstance(message.event, events.Ended | events.Interrupted)
     return isinstance(message, protocol.HostFailed) and message.exit_code is not None

@@ -45,21 +45,14 @@ class RemoteOperator:
 
 
 class RunHost:
-    """One run and its audience.
+    """One run, whose operator should be a :class:`RemoteOperator`, and its audience."""
 
-    Args:
-        request: the run; its operator should be a :class:`RemoteOperator`.
-        queue: the commands of the engine.
-        away_s: how long the run waits for a person while nobody is in control, s; by default as the cell
-            file has it.
-    """
-
-    def __init__(self, request: RunRequest, queue: CommandQueue, *, away_s: float | None = None) -> None:
+    def __init__(self, request: RunRequest, queue: CommandQueue) -> None:
         settings = request.cell.settings
         self._watching = RunDeviceWatch(settings.gauges)
         self._request = request
         self._queue = queue
-        self._away_s = 60.0 * settings.recovery.away_minutes if away_s is None else away_s
+        self._away_minutes = settings.recovery.away_minutes
         self._audience = Audience(
             self._opening, on_command=self._queue.put, on_control=self._on_control, on_leave=self._on_leave
         )
@@ -175,7 +168,6 @@ class RunHost:
         self._reconsider()
 
     def _opening(self) -> list[bytes]:
-        """The lines that a new client receives first."""
         present = [messages.message_line(messages.StatusChanged(status=self._status))]
         if self._question is not None:
             present.append(messages.message_line(messages.QuestionChanged(question=self._question)))
@@ -204,8 +196,8 @@ class RunHost:
             self._giving_up = None
         elif self._giving_up is None and is_away:
             loop = asyncio.get_running_loop()
-            stop = Stop(f"nobody was connected for {self._away_s / 60.0:g} minutes")
-            self._giving_up = loop.call_later(self._away_s, self._queue.put, stop)
+            stop = Stop(f"nobody was connected for {self._away_minutes:g} minutes")
+            self._giving_up = loop.call_later(60.0 * self._away_minutes, self._queue.put, stop)
 
     async def _watch_devices(self) -> None:
         async for snapshot in self._watching.snapshots():

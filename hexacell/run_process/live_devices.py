@@ -9,7 +9,6 @@ from functools import partial
 from statistics import stdev
 from typing import Any
 
-from drivers.interfaces import GaugeReading
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.wire_trace import WireTrace
 from hexacell.cell.devices import GaugeSettings
@@ -52,11 +51,6 @@ class LiveFeed:
         self._recent: dict[str, deque[tuple[float, float]]] = {
             gauge.name: deque(maxlen=NOISE_READINGS) for gauge in gauges
         }
-
-    @property
-    def gauges(self) -> tuple[LiveValue[GaugeReading], ...]:
-        """The live values of the gauges."""
-        return tuple(self._live.gauge(gauge.name) for gauge in self._gauges)
 
     def snapshot(self) -> LiveSnapshot:
         """The latest values of all devices."""
@@ -146,6 +140,7 @@ class RunDeviceWatch:
 
     def __init__(self, gauges: Sequence[GaugeSettings]) -> None:
         self.live = LiveValues()
+        self._gauges = tuple(gauges)
         self._feed = LiveFeed(self.live, gauges)
         self._devices: Devices | None = None
         self._polling: asyncio.Task[None] | None = None
@@ -172,7 +167,7 @@ class RunDeviceWatch:
         if self.is_waiting:
             with suppress(TimeoutError):
                 async with asyncio.timeout(FRESH_S), aclosing(self.live.changes(0.0)) as changes:
-                    while any(gauge.age_s > SAMPLE_PERIOD_S for gauge in self._feed.gauges):
+                    while any(self.live.gauge(one.name).age_s > SAMPLE_PERIOD_S for one in self._gauges):
                         await anext(changes)
         return self._feed.snapshot()
 

@@ -96,7 +96,6 @@ class TechnicianApp(App[int]):
         self.run_worker(self._attend(), exit_on_error=False, group="attend")
 
     async def _attend(self) -> None:
-        """Follow the cell as long as the application runs."""
         try:
             if not await self._has_cell():
                 self.exit(0)
@@ -151,7 +150,6 @@ class TechnicianApp(App[int]):
         return any(line.outer_size.width == self.size.width for line in self.screen.query(KeyLine))
 
     def _overlay_question(self, model: ScreenModel) -> None:
-        """Show a new question; take away one that was answered."""
         number, view = model.run.questions, model.question()
         shown = next((one for one in self.screen_stack if isinstance(one, overlays.QuestionOverlay)), None)
         if shown is not None and (view is None or shown.number != number) and shown.is_current:
@@ -169,7 +167,6 @@ class TechnicianApp(App[int]):
         self.run_worker(self._waiting_for(work), exit_on_error=False)
 
     async def _waiting_for(self, work: Coroutine[Any, Any, str | None]) -> None:
-        """Wait for some work; say what it says, or what went wrong."""
         try:
             if said := await work:
                 self.notify(said, markup=False)
@@ -177,7 +174,6 @@ class TechnicianApp(App[int]):
             self._show_error(error)
 
     def _show_error(self, error: HexacellError) -> None:
-        """Show an error that a person can act on."""
         self.push_screen(
             overlays.FaultOverlay(FaultView("That did not work", error.cause, error.action or ""))
         )

@@ -153,16 +153,13 @@ class ScreenModel:
                 }
             case "review":
                 return self._result()
-            case "history":
+            case _:  # the history
                 title = history_head() if self.runs else reviewing.READING if self.runs is None else NO_RUNS
                 asked = () if self.runs is None else (*reviewing.WHAT_TO_PRESS, "", *self._compared)
                 rows = [(run.name, history_line(run)) for run in self.runs or ()]
                 return {"history-header": (title,), "comparison": (asked,), "runs": (rows,)}
-            case _:
-                raise UsageError(f"there is no screen {screen!r}")
 
     def _devices_now(self) -> list[Line]:
-        """The devices as they show now."""
         snapshot, later_s = self._live()
         if self._devices.problem and snapshot is None:
             return [(self._devices.problem, Urgency.CALM)]
@@ -216,8 +213,10 @@ class ScreenModel:
             shown: dict[str, tuple[Any, ...]] = {name: (text,) for name, text in texts.items()}
             urgency = reviewing.URGENCIES.get(picture.state.verdict, Urgency.ATTENTION)
             shown["verdict"] = (texts["verdict"], urgency)
-            plots = enumerate(reviewing.review_plots(picture))
-            self._reviewed = (seen, shown | {f"plot-{number}": (plot,) for number, plot in plots})
+            shown["plot-0"] = (reviewing.deviation_plot(picture.state),)
+            shown["plot-1"] = (reviewing.residual_plot(picture),)
+            shown["plot-2"] = (accuracy_plot(picture, None),)
+            self._reviewed = (seen, shown)
         return self._reviewed[1]
 
     def question(self) -> QuestionView | None:

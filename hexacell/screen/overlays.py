@@ -46,8 +46,7 @@ class AnswerOverlay(ModalScreen[ScreenResultType]):
         self.view = view
 
     @abstractmethod
-    async def give(self, value: str | None) -> None:
-        """Give an answer."""
+    async def _give(self, value: str | None) -> None: ...
 
     def compose(self) -> ComposeResult:
         """The question, the gauges where they matter, and what to press."""
@@ -87,12 +86,12 @@ class AnswerOverlay(ModalScreen[ScreenResultType]):
             is_refused = choice.is_consent and bool(self.view.refusal)
             if event.key == choice.key and not is_typing and not is_refused:
                 event.stop()
-                await self.give(choice.value)
+                await self._give(choice.value)
 
     async def on_input_submitted(self, event: Input.Submitted) -> None:
         """Take consent that is typed in full."""
         if event.value.strip().lower() == self.view.typed.lower():
-            await self.give(self.view.consent)
+            await self._give(self.view.consent)
 
 
 class ConfirmOverlay(AnswerOverlay[str | None]):
@@ -100,8 +99,7 @@ class ConfirmOverlay(AnswerOverlay[str | None]):
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape", "dismiss", "No")]
 
-    async def give(self, value: str | None) -> None:
-        """Give an answer."""
+    async def _give(self, value: str | None) -> None:
         self.dismiss(value)
 
 
@@ -132,8 +130,7 @@ class QuestionOverlay(AnswerOverlay[None]):
         self.number = number
         self._answer = answer
 
-    async def give(self, value: str | None) -> None:
-        """Give an answer."""
+    async def _give(self, value: str | None) -> None:
         await self._answer(value)
 
     async def action_abort(self) -> None:

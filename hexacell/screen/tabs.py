@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
@@ -30,12 +31,11 @@ class TabScreen(Screen[None]):
         """The first lines, what is its own, and the footer."""
         yield widgets.TopLine()
         yield widgets.TabLine(self.TAB, self._keys)
-        yield from self.compose_body()
+        yield from self._parts()
         yield widgets.KeyLine(self._keys)
 
-    def compose_body(self) -> ComposeResult:
-        """What this screen has of its own."""
-        yield from ()
+    @abstractmethod
+    def _parts(self) -> ComposeResult: ...
 
     def draw(self, model: ScreenModel) -> None:
         """Show what is so now."""
@@ -50,8 +50,7 @@ class CellScreen(TabScreen):
     TAB = "cell"
     AUTO_FOCUS = "#settings"
 
-    def compose_body(self) -> ComposeResult:
-        """The parts of this screen."""
+    def _parts(self) -> ComposeResult:
         yield widgets.TextPanel("Devices, as they show now", classes="title")
         yield widgets.DevicePanel(id="devices")
         yield widgets.TextPanel("Cell file", id="settings-title", classes="title")
@@ -75,8 +74,7 @@ class PreflightScreen(TabScreen):
         Binding("r", "app.perform('start', 'resume')", "Resume the latest run", show=False),
     ]
 
-    def compose_body(self) -> ComposeResult:
-        """The parts of this screen."""
+    def _parts(self) -> ComposeResult:
         yield widgets.TextPanel(id="instruction", classes="instruction")
         yield widgets.TextPanel("What must hold before the robot moves", classes="title")
         yield widgets.TextList(id="checklist")
@@ -105,8 +103,7 @@ class MeasureScreen(TabScreen):
         Binding("end", "app.perform('step', 'last')", "To the end", show=False, priority=True),
     ]
 
-    def compose_body(self) -> ComposeResult:
-        """The parts of this screen."""
+    def _parts(self) -> ComposeResult:
         yield widgets.GuidancePanel(id="guidance")
         yield widgets.TextPanel("Devices", id="devices-title", classes="title")
         yield widgets.DevicePanel(id="devices")
@@ -129,8 +126,7 @@ class ReviewScreen(TabScreen):
     TAB = "review"
     AUTO_FOCUS = "#details"
 
-    def compose_body(self) -> ComposeResult:
-        """The parts of this screen."""
+    def _parts(self) -> ComposeResult:
         yield widgets.TextPanel(id="verdict")
         yield widgets.TextPanel(id="scope")
         yield widgets.TextPanel(id="approval")
@@ -162,8 +158,7 @@ class HistoryScreen(TabScreen):
 
     is_asked = False
 
-    def compose_body(self) -> ComposeResult:
-        """The parts of this screen."""
+    def _parts(self) -> ComposeResult:
         yield widgets.TextPanel(id="history-header", classes="table-header")
         yield widgets.RowList(id="runs")
         yield widgets.TextPanel("Comparison", classes="title")

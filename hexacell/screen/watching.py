@@ -21,11 +21,7 @@ AGAIN_AFTER_S = 3.0
 
 
 class RunFollower:
-    """A run as a screen sees it.
-
-    Args:
-        now: gives seconds, for the age of values.
-        on_end: called when a run has sent everything.
+    """A run as a screen sees it; ``on_end`` is called when it has sent everything.
 
     Attributes:
         connection: the run that is followed; None when it is over.

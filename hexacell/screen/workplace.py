@@ -37,17 +37,6 @@ def mode_of(what: str) -> Mode:
     return Mode.OPTIMISE if what in {RESUME, WITH_LENGTH} else Mode(what)
 
 
-class ConsentGiven:
-    """An operator who has been asked on the screen already, and has consented."""
-
-    def __init__(self, by: str) -> None:
-        self._by = by
-
-    async def ask(self, question: Question) -> str | None:  # noqa: ARG002 - it was answered on the screen
-        """Who has consented."""
-        return self._by
-
-
 class Workplace:
     """The cell at a path: its devices, its run and its history. All methods raise ``HexacellError``.
 
@@ -138,7 +127,7 @@ class Workplace:
             LimitError: a gate refuses it.
         """
         proposal = await asyncio.to_thread(read_proposal, find_run(self.cell, run))
-        applied = await apply_proposal(proposal, ConsentGiven(by), typed_by=by)
+        applied = await apply_proposal(proposal, None, typed_by=by)
         return tuple(applied_text(applied).splitlines())
 
     async def roll_back(self, run: str, by: str) -> tuple[str, ...]:

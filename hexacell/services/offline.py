@@ -14,8 +14,10 @@ from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
 from hexacell.errors import FileError, HexacellError, UsageError, joined
 from hexacell.identification.identified_zeros import ParameterChoice
+from hexacell.identification.thermal_expansion import known_parts
 from hexacell.measurements.records import MeasurementSet, RecordId
 from hexacell.robot.model import robot_of
+from hexacell.robot.stated import stated_effects
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services.design_facts import StatedPose, require_design, stated_poses
 
@@ -96,6 +98,8 @@ def fit_measurements(
         if measured is not None:
             settings = with_measured_noise(settings, measured)
             robot = robot.with_errors_of(settings)
+    known = known_parts(one.temperatures for one in measurements.records)
+    robot = replace(robot, effects=stated_effects(settings, known=known))
     if identify_only is not None:
         robot = replace(robot, identifies=identify_only)
     found = identify(robot.problem(measurements))

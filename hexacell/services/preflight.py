@@ -48,7 +48,6 @@ def toggle_exclusion(cell: Cell, name: str, planned: Sequence[VisitedPose]) -> C
 
 
 def _exclusion_of(cell: Cell, name: str, planned: Sequence[VisitedPose]) -> Mapping[str, Any]:
-    """The keys and values of an exclusion."""
     points = cell.settings.identification.points
     if name.isdecimal() and 0 < int(name) <= len(points):
         return {"point": int(name)}

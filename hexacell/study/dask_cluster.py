@@ -86,11 +86,7 @@ class LoopThread:
 
 
 class ClusterExecutor(Executor):
-    """One connection to a cluster, broken when that is.
-
-    Args:
-        address: address of the scheduler.
-        patience_s: how long to wait for its answer and its workers, s.
+    """One connection to a cluster, broken when that is; waits ``patience_s`` for its answer and workers, s.
 
     Raises:
         ClusterError: it does not answer, has no workers, or another version of this program.

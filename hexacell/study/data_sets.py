@@ -4,7 +4,7 @@ Nothing here uses the derivatives that the estimator works with: poses are found
 deviations are differences of positions.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,9 +21,6 @@ from hexacell.robot.model import Robot
 BATCH = 64
 BATCHES = 60
 """Orientations are drawn in batches, and so many batches at most."""
-
-TurnsOf = Callable[[Array], Array]
-"""Rotations (n, 3, 3) of three angles each (n, 3), rad."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,11 +63,8 @@ def unlimited_travel(
     random: np.random.Generator,
     *,
     margin: float | None = None,
-    turns_of: TurnsOf = rotations.from_angles,
 ) -> DataSet:
     """Random angles within ``amplitude``, rad, at points (m, 3), mm, as in the paper's simulation.
-
-    ``turns_of`` says what three angles mean.
 
     Every pose is commanded at the point itself and may end far from it, so that gauges of any travel are
     assumed. Poses keep the singularity ``margin``, by default the robot's limit; with 0 they only have
@@ -82,18 +76,16 @@ def unlimited_travel(
     margin = robot.limits.singularity_margin if margin is None else margin
     sets = []
     for point in points:
-        turns = random_orientations(random, amplitude, turns_of)
+        turns = random_orientations(random, amplitude)
         drawn = (robot.frames.poses(PoseBatch.at(point, each)) for each in turns)
         sets.append(first_reached(robot, truth, point, drawn, orientations, margin))
     return data_set(robot, sets, orientations)
 
 
-def random_orientations(
-    random: np.random.Generator, amplitude: float, turns_of: TurnsOf = rotations.from_angles
-) -> Iterator[Array]:
+def random_orientations(random: np.random.Generator, amplitude: float) -> Iterator[Array]:
     """Batches of rotations (n, 3, 3) whose three angles are within ``amplitude``, rad."""
     for _ in range(BATCHES):
-        yield turns_of(random.uniform(-amplitude, amplitude, (BATCH, 3)))
+        yield rotations.from_angles(random.uniform(-amplitude, amplitude, (BATCH, 3)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

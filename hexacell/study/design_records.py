@@ -62,7 +62,6 @@ class ChosenRecords:
 
     robot: Robot
     measurements: MeasurementSet
-    outside: int = 0
 
 
 def chosen_records(
@@ -82,7 +81,7 @@ def chosen_records(
             plan = Plan(settings, robot, with_forecast=False)
             campaign = VirtualCampaign(plan, VirtualRobot(robot, truth, random))
             campaign.carry_out()
-            return ChosenRecords(campaign.plan.robot, campaign.measurements, campaign.outside)
+            return ChosenRecords(campaign.plan.robot, campaign.measurements)
         case OrientationChoice.FIXED:
             return ChosenRecords(robot, _visited(robot, truth, _best_fixed(settings, robot, truth), random))
         case OrientationChoice.SIFTED:
@@ -222,18 +221,12 @@ def chosen_orientations(
 ) -> DataSet:
     """So many orientations within ``amplitude``, rad, at each of some points (m, 3), mm, that we choose.
 
+    It is to be accurate at points (k, 3), mm, within angles of so many rad (``accurate_at``).
+
     By the drawing alone, before anything is measured, for gauges of any travel: of a pool of random
     orientations at each point, one at a time, that which says most of the position at the poses where the
-    robot is to be accurate (I-optimality, :mod:`hexacell.design.criteria`).
-
-    Args:
-        robot: with its drawing, its tolerances and the noise of its records.
-        truth: the geometry that decides what can be reached.
-        points: where the gauges are.
-        orientations: at each point; the first is drawn.
-        accurate_at: points (k, 3), mm, at which it is to be accurate, within angles of so many rad.
-        amplitude: of each angle.
-        random: source of the pools.
+    robot is to be accurate (I-optimality, :mod:`hexacell.design.criteria`). The first is drawn. The
+    ``truth`` decides what can be reached.
 
     Raises:
         LimitError: a point cannot be reached.

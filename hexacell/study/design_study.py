@@ -79,12 +79,10 @@ class DesignOutcome:
     Attributes:
         accuracies: with the records of the first two points, three, and so on.
         deviation_mm: the largest that a gauge had to show.
-        outside: poses at which the ball left the travel.
     """
 
     accuracies: tuple[RecordsAccuracy, ...] = ()
     deviation_mm: float = 0.0
-    outside: int = 0
     reason: str = ""
 
     @property
@@ -116,7 +114,7 @@ def _outcome(cell: Cell, chosen: ChosenRecords, truth: Geometry) -> DesignOutcom
     deviations = [np.abs(record.deviation).max() for record in chosen.measurements.records]
     last = found[-1]
     reason = "" if last is not None else f"its {len(points)} records do not determine the robot"
-    return DesignOutcome(accuracies, float(max(deviations)), chosen.outside, reason)
+    return DesignOutcome(accuracies, float(max(deviations)), reason)
 
 
 def _identified(chosen: ChosenRecords, count: int) -> Identification | None:
@@ -193,7 +191,6 @@ class ChoiceCurve:
     tried: int
     by_records: Mapping[int, Spread]
     deviation_mm: float
-    outside: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,7 +217,6 @@ def design_trials_of(robots: int) -> list[DesignTrial]:
 
 
 def _swept(name: str, robots: int) -> dict[float, list[DesignTrial]]:
-    """The trials of a sweep by the value."""
     field, values = SWEEPS[name]
     usual = [DesignTrial(number) for number in range(min(robots, SWEPT))]
     varied: dict[float, dict[str, Any]] = {float(value): {field: value} for value in values}
@@ -256,7 +252,6 @@ def _curve(outcomes: Sequence[DesignOutcome]) -> ChoiceCurve:
         len(outcomes),
         {count: Spread.of([one for one in every if one.records == count]) for count in counts},
         _quantile([one.deviation_mm for one in outcomes if one.accuracies], 0.5),
-        sum(one.outside for one in outcomes),
     )
 
 

@@ -5,7 +5,6 @@ It minimises the plain sum of squares of all pairwise differences, eq. 5-8:
 """
 
 import itertools
-from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,30 +41,13 @@ def gauss_newton(
         ConvergenceError: it left the assembly mode or did not settle; the paper's method needs a
             good initial estimate.
     """
-    change = np.inf
-    for number, (geometry, change) in enumerate(gauss_newton_steps(problem, start=start), start=1):
-        if change < tolerance_mm:
-            return geometry
-        if number == steps:
-            break
-    raise ConvergenceError(f"Gauss-Newton did not converge in {steps} steps")
-
-
-def gauss_newton_steps(
-    problem: Problem, *, start: Identification | None = None
-) -> Iterator[tuple[Geometry, float]]:
-    """The geometry after each step of eq. 13, and the largest change of a free parameter by it; endless.
-
-    Raises:
-        ConvergenceError: it left the assembly mode.
-    """
     if start is None:
         problem = problem.subset(problem.has_start_pose)
-    free = problem.initial_parameters
-    poses, rows = problem.start, pairs(problem)
-    if start is not None:
+        free, poses = problem.initial_parameters, problem.start
+    else:
         free, poses = start.free, start.poses
-    while True:
+    rows = pairs(problem)
+    for _ in range(steps):
         prediction = measurement_model.predict(problem, free, poses)
         error = error_vector(problem, prediction.residuals)
         jacobian = prediction.jacobian[rows[:, 0]] - prediction.jacobian[rows[:, 1]]
@@ -76,4 +58,6 @@ def gauss_newton_steps(
         if not reached.found.all():
             raise ConvergenceError("Gauss-Newton left the assembly mode of a record")
         poses = reached.poses
-        yield geometry, float(np.abs(step).max())
+        if np.abs(step).max() < tolerance_mm:
+            return geometry
+    raise ConvergenceError(f"Gauss-Newton did not converge in {steps} steps")

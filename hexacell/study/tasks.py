@@ -109,12 +109,8 @@ def run_study(
 ) -> SummaryType:
     """The summary of a study; results that ``folder`` has already are not computed again.
 
-    Args:
-        study: one of them.
-        folder: gets a line for each task, in a file ``.jsonl`` named after the study.
-        draws: as many as the study is to make.
-        new_executor: what carries out the tasks, such as :func:`processes`; another one where it breaks.
-        on_progress: called after every task.
+    It gets a line for each task, in a file ``.jsonl`` named after the study. ``new_executor`` gives what
+    carries out the tasks, such as :func:`processes`, and another one where that breaks.
 
     Raises:
         FileError: the folder cannot be written, or has another file of that name.

@@ -55,7 +55,7 @@ def cell_text(found: device_search.SearchFindings) -> str:
         notes.append(f"nodes: those of legs 1 to 6{'' if len(nodes) == LEGS else ': six are needed'}.")
         document["encoders"] = {"protocol": "cia406", "bus": bus.bus, "nodes": nodes}
         document["encoders"] |= device_search.encoder_keys(encoders)
-    elif (unknown := device_search.unknown_encoders(found)) is not None:
+    elif unknown := next((bus for bus in found.buses if bus.frames), None):  # of no CANopen node
         frames = ", ".join(map(_number, unknown.frames[:MOST_FRAMES]))
         notes.append("encoders.dbc: the file of their maker; a count is no coarser than its steps.")
         notes.append(f"signals: Message.Signal of legs 1 to 6, from the messages among {frames}.")

@@ -86,7 +86,6 @@ def accuracy_table(assessed: Assessment) -> str:
 
 
 def _identified(assessed: Assessment) -> str:
-    """Which parameters are identified, where not all are."""
     if assessed.zeros is None:
         return ""
     zeros, free = assessed.zeros.kept.columns.shape[1], len(assessed.found.free)

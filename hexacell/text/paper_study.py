@@ -15,15 +15,14 @@ WHAT_THE_PAPER_SAYS = {
 }
 OPEN = (
     "The paper leaves open where its points are, which orientations it takes, what their angles mean and "
-    "when it stops. Here: P1 to P5 of its Table 3; each of three angles between plus and minus an "
-    "amplitude, about fixed axes; until a step is below 1e-6 mm."
+    f"when it stops. Here: P1 to P5 of its Table 3; each of three angles within "
+    f"+-{simulation.AMPLITUDE_DEG:g} deg, about fixed axes; until a step is below 1e-6 mm."
 )
 NO_GAUGE = (
     "No dial gauge shows such deviations. `hexacell demo` stays within 12.5 mm of travel: it turns the "
     "platform as far as what is known so far allows."
 )
 HEAD = f"  {'points':<8} {'without noise: P, ours':<26} {'with noise: P, ours there, ours':<32} deviation"
-SWEEP_HEAD = f"  {'angles':<16} deg {'after steps':<20} {'P, ours there, ours':<24} deviation"
 
 
 def study_lines(study: simulation.PaperStudy) -> Iterator[str]:
@@ -31,12 +30,12 @@ def study_lines(study: simulation.PaperStudy) -> Iterator[str]:
     yield wrapped(OPEN)
     for figure, sets in study.figures.items():
         yield ""
-        first = sets[0]
         yield wrapped(
             f"Figure {figure}: largest error of a parameter, mm; {simulation.FIGURES[figure]} "
-            f"orientations at each point, +-{first.amplitude_deg:g} deg; medians of {first.noisy.trials} "
-            "draws. P is the paper's estimator, in brackets in how many draws it comes to an end; then "
-            "ours of the same draws, and of all. The deviation is what gauges would have to show."
+            f"orientations at each point, +-{simulation.AMPLITUDE_DEG:g} deg; medians of "
+            f"{sets[0].noisy.trials} draws. P is the paper's estimator, in brackets in how many draws it "
+            "comes to an end; then ours of the same draws, and of all. The deviation is what gauges would "
+            "have to show."
         )
         yield HEAD
         for one in sets:
@@ -49,17 +48,6 @@ def study_lines(study: simulation.PaperStudy) -> Iterator[str]:
     for kind, found in study.table_2.items():
         both = f"{_number(found['paper_mm']):<19} {_number(found['ours_mm'])}"
         yield f"  {kind:<12} {simulation.PAPER_TABLE_2_MM[kind]:<14.3f} {both}"
-    yield ""
-    yield wrapped(
-        "Other orientations: 5 points, 11 orientations, with noise; largest error of a parameter, mm. "
-        f"After {', '.join(map(str, simulation.STEPS_SHOWN))} steps of the paper's estimator, at its end, "
-        "and ours as above."
-    )
-    yield SWEEP_HEAD
-    for one in study.sweep:
-        after = " ".join(f"{_number(error):<6}" for error in one.noisy.after_steps_mm.values())
-        angles = f"{one.angles:<16} {one.amplitude_deg:<3g}"
-        yield f"  {angles} {after} {_in_full(one.noisy):<24} {one.deviation_mm:.0f} mm"
     yield ""
     yield wrapped(NO_GAUGE)
 

@@ -41,7 +41,6 @@ def found_sentence(found: FoundTerms) -> str:
 
 
 def _size(term: TermResult) -> str:
-    """A term with its smallest and largest coefficient."""
     values, sigma = _smallest_to_largest(term.values), _smallest_to_largest(term.sigma)
     return f"{term.name} of {values} {term.unit} (one sigma {sigma})"
 
@@ -52,7 +51,6 @@ def _smallest_to_largest(numbers: Six | None) -> str:
 
 
 def _fate(term: TermResult, found: FoundTerms) -> str:
-    """What becomes of a term."""
     if found.is_corrected(term):
         return "corrected by the controller"
     is_backlash = term.name == CorrectionKind.BACKLASH

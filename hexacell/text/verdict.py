@@ -9,7 +9,6 @@ from hexacell.lengths import from_to, shown, unit_of
 from hexacell.results.result import ExpectedImprovement, LengthResult
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.text.layout import change_with_sigma, counted, wrapped
-from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy
 from hexacell.verdict.either_side import EitherSide
 from hexacell.verdict.length_check import LengthStatement
@@ -47,7 +46,6 @@ def verification_text(verified: Verification) -> str:
 
 
 def _size(error: JudgedError, unit: str) -> str:
-    """An error and its uncertainty."""
     shown = error.shown_in(unit)
     return f"{shown.length(error.value)}, U {shown.number(error.expanded)}"
 
@@ -164,11 +162,6 @@ def length_text(stated: LengthStatement) -> str:
     largest = sorted(result.sources, key=lambda source: -source.um_m)[:NAMED_SOURCES]
     named = ", ".join(f"{source.name} {source.um_m:.1f}" for source in largest)
     return "\n".join([*lines, f"  uncertainty, um/m, 1 sigma: {named}"])
-
-
-def gate_lines(gates: Sequence[AcceptanceGate]) -> str:
-    """Each gate before a write-back, whether it is passed, in a line."""
-    return "\n".join(f"{'ok' if gate.passed else 'NO'}  {gate.sentence}" for gate in gates)
 
 
 def improvement_sentence(

@@ -13,6 +13,7 @@ from functools import partial
 import numpy as np
 
 from hexacell.identification.placement import Placement, RecordPlacement, Weight, leg_forces
+from hexacell.identification.thermal_expansion import longer_legs
 from hexacell.kinematics.parameters import LEGS, JointUnit, MachinePart
 from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effects import UM, Effect, Occurrence
@@ -137,6 +138,31 @@ def temperature_while_measuring(kelvin: float, um_per_m_k: Mapping[MachinePart, 
 
     name = "temperature while measuring"
     return Effect(name, kelvin, "K", Occurrence.MEASURING, expansion)
+
+
+def thermometers_of_legs(kelvin: float, um_per_m_k: float) -> Effect:
+    """Each leg's thermometer is wrong by this much more at the last record than at the first, evenly.
+
+    What all records have alike is a part of the identified geometry.
+    """
+
+    def expansion(at: Placement) -> Array:
+        progress = np.linspace(-0.5, 0.5, len(at))[:, None, None]
+        return np.asarray(progress * at.by_constraints * longer_legs(at, um_per_m_k)[:, None, :])
+
+    return Effect("thermometers of the legs", kelvin, "K", Occurrence.MEASURING, expansion)
+
+
+def expansion_coefficients(percent: float, legs_um_m_k: float, base_um_m_k: float) -> Effect:
+    """All legs, and the base, expand more than stated by this share of it."""
+
+    def expansion(records: RecordPlacement) -> Array:
+        legs, base = legs_um_m_k * records.warmer[:, :LEGS], base_um_m_k * records.warmer[:, LEGS:]
+        errors = np.stack([longer_legs(records, legs), longer_legs(records, -base)], axis=-1)
+        return np.asarray(records.by_constraints @ (0.01 * errors))[:, :3]
+
+    name = "coefficients of thermal expansion"
+    return Effect(name, percent, "%", Occurrence.MEASURING, on_readings=expansion)
 
 
 def load_at_work(newton: float, um_per_n: float) -> Effect:

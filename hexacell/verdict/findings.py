@@ -9,6 +9,7 @@ from hexacell.kinematics.mechanism import FrameConvention
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.lengths import shown
 from hexacell.noise.record_noise import NoiseLevel, NoiseLevels
+from hexacell.results.result import legs_at
 from hexacell.verdict.acceptance_gates import residual_sentence
 from hexacell.verdict.assessment import SEPARATED_PAIRS, Assessment
 
@@ -32,6 +33,7 @@ def findings(assessed: Assessment) -> tuple[str, ...]:
         _noise(assessed),
         _undetermined(assessed),
         _unreachable(assessed),
+        _temperatures(assessed),
         *map(str, assessed.found.data_faults),
     )
     return tuple(sentence for sentence in sentences if sentence)
@@ -213,3 +215,8 @@ def _unreachable(assessed: Assessment) -> str:
     numbered = enumerate(assessed.accuracy.reachable, start=1)
     unreachable = ", ".join(str(number) for number, is_reachable in numbered if not is_reachable)
     return f"Task poses that the robot cannot reach are left out: {unreachable}."
+
+
+def _temperatures(assessed: Assessment) -> str:
+    legs = legs_at(assessed.found.problem.holds_at)
+    return f"The geometry is that with {legs}." if legs else ""

@@ -9,7 +9,7 @@ from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.fields import Frozen
 from hexacell.cell.model import CellSettings
 from hexacell.cell.uncertainty import LengthCheckSettings
-from hexacell.identification.placement import RecordPlacement
+from hexacell.identification.placement import Placement, RecordPlacement
 from hexacell.identification.solver.chi_square import SMALLEST_PROBABILITY
 from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet
@@ -91,14 +91,17 @@ def length_check(
     """
     fixture = settings.length_check
     assert fixture is not None  # noqa: S101 - a run without one has no such records
+    poses, warmer = robot.frames.poses(measured.records.poses), robot.expansion.warmer(measured.records)
+    shown = Placement(robot.mechanism, geometry, poses, measured.records.joints)
     commanded = RecordPlacement(
         robot.mechanism,
         geometry,
-        robot.frames.poses(measured.records.poses),
-        measured.records.joints,
+        poses,
+        robot.expansion.joints_without(shown, warmer),
         robot.frames.deviations(measured.records.deviations),
         robot.frames.base,
         measured.records.directions,
+        warmer,
     )
     records = LengthRecords.of(commanded, measured.records.points)
     return LengthCheck.of(records, length_standard(fixture, measured.celsius), robot.noise, judged, effects)

@@ -81,11 +81,6 @@ def with_zeros_doubted(tests: Sequence[ModelTest]) -> tuple[ModelTest, ...]:
     )
 
 
-def doubts_zeros(tests: Sequence[ModelTest]) -> bool:
-    """Whether a test failed for which that is a possible cause."""
-    return any(one.sentence.endswith(ZEROS_DOUBTED) for one in tests if not one.passed)
-
-
 def fails_narrowly(tests: Sequence[ModelTest]) -> bool:
     """Whether tests failed, each of them in a way that confirming records can distinguish from chance."""
     failed = [test for test in tests if not test.passed]

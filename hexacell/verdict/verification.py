@@ -27,7 +27,7 @@ from hexacell.kinematics.rotations import Array
 from hexacell.lengths import from_to
 from hexacell.measurements.records import MeasurementSet
 from hexacell.results.absorbed_terms import errors_of_geometry_alone
-from hexacell.results.result import IdentificationResult, LengthResult
+from hexacell.results.result import IdentificationResult, LengthResult, legs_at
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.length_records import JudgedGeometry
 from hexacell.verdict.decision import Verdict, VerifiedAccuracy, worst_verdict
@@ -37,7 +37,6 @@ from hexacell.verdict.model_evidence import (
     ZEROS_DOUBTED,
     ModelTest,
     confirmed,
-    doubts_zeros,
     fails_narrowly,
     model_tests,
     with_zeros_doubted,
@@ -251,6 +250,8 @@ def outcome_line(
     if result.identifies is not ParameterChoice.ALL:
         what = f"zeros only, {unknowns} of {what}"
     parts = [f"{what}, {result.records} records at {result.points} points"]
+    if legs := legs_at(result.holds_at_c):
+        parts.append(f"geometry of {legs}")
     if verified.before_mm is not None and verified.after_mm is not None:
         means = from_to(verified.before_mm, verified.after_mm, 2)
         parts.append(f"mean deviation at held-out poses {means}")
@@ -277,7 +278,8 @@ def reason_of(verified: Verification) -> str:
     """Why a verdict is not that of the error shown; empty where it is."""
     failed = [test.sentence for test in verified.tests if not test.passed]
     if verified.is_worse:
-        doubt = f"; {ZEROS_DOUBTED.rstrip('.')}" if doubts_zeros(verified.tests) else ""
+        is_of_zeros = any(sentence.endswith(ZEROS_DOUBTED) for sentence in failed)
+        doubt = f"; {ZEROS_DOUBTED.rstrip('.')}" if is_of_zeros else ""
         return f"worse than before{doubt}"
     if verified.verdict is Verdict.NOT_EVALUATED and failed:
         return failed[0].rstrip(".")

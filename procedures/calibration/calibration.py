@@ -8,7 +8,7 @@ resumption and its replay compute alike.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property, lru_cache, partial
@@ -27,9 +27,11 @@ from hexacell.identification.estimator import identify
 from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.identification.problem.prior import IdentifiedBefore
 from hexacell.identification.solver.result import Identification
+from hexacell.identification.thermal_expansion import known_parts
 from hexacell.kinematics.commanded_motion import RefusedCommands
 from hexacell.kinematics.corrections import Corrections
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.parameters import MachinePart
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
 from hexacell.noise.allowances import Allowances
@@ -262,7 +264,11 @@ class Knowledge:
             noise = noise_again(self.calibration.plan, state, found, self.walk_mm) or noise
             settings = with_measured_noise(self.calibration.settings, noise)
             robot = replace(robot, noise=noise_of(settings))
-        robot = self._at_temperatures(robot, settings, state.temperature_range_k)
+        robot = replace(robot, expansion=robot.expansion.referred_to(state.measurements()))
+        samples = (one for phase in Phase for one in state.samples(phase))
+        known = known_parts(one.reading.part_temperatures for one in samples)
+        on_legs = [one.name for one in settings.thermometers if known and one.legs]
+        robot = self._at_temperatures(robot, settings, state.temperature_range_k(on_legs), known)
         if noise is None:
             return robot
         robot = replace(robot, noise=replace(robot.noise, walk_mm=self.walk_mm))
@@ -288,10 +294,16 @@ class Knowledge:
         calibration = self.calibration
         return Plan(self.settings, robot, calibration.listed, calibration.effort)
 
-    def _at_temperatures(self, robot: Robot, settings: CellSettings, range_k: float | None = None) -> Robot:
+    def _at_temperatures(
+        self,
+        robot: Robot,
+        settings: CellSettings,
+        range_k: float | None = None,
+        parts: Collection[MachinePart] = (),
+    ) -> Robot:
         """The robot with the effects of temperatures read while measuring, and a scale measured before."""
         accepted = self.calibration.accepted
-        effects = stated_effects(settings, range_k)
+        effects = stated_effects(settings, range_k, parts)
         length = None if accepted is None else accepted.length
         is_carried_on = accepted is not None and self.calibration.mode is Mode.QUICK
         known = accepted.parameter_columns if accepted is not None and is_carried_on else {}

@@ -31,7 +31,7 @@ from procedures.guards.position_check import PositionReports
 from procedures.resources.controller_config import ConfigChanges, ConfigEdits, Startup
 from procedures.run.keys import SetKey, SixNumbers
 from procedures.run.questions import Operator
-from procedures.run.readings import Reading, ReadingSeries, Temperature
+from procedures.run.readings import Reading, ReadingSeries, Temperature, on_parts
 from procedures.run.state import RunState
 from procedures.run.trips import Guard, Trip, WatchedSet
 
@@ -172,7 +172,9 @@ class RunResources:
             await self.guards.during_readings(lambda: settle(self.devices, timing, self.clock))
             for _ in range(windows)
         ]
-        return _reading(self.devices, settled, await self.thermometers.read(), state.directions)
+        reading = _reading(self.devices, settled, await self.thermometers.read(), state.directions)
+        on_them = on_parts(self.settings.thermometers, reading.temperatures)
+        return reading.model_copy(update={"part_temperatures": on_them})
 
     async def read_series(self, count: int) -> ReadingSeries:
         """A series of readings of all devices, once they are settled; raises ``HexacellError``."""

@@ -7,7 +7,7 @@ import numpy as np
 from hexacell.cell.devices import ThermometerSettings
 from hexacell.cell.fields import Frozen
 from hexacell.kinematics.parameters import LEGS
-from hexacell.kinematics.rotations import Array
+from hexacell.measurements.records import Temperatures, temperatures_of
 from procedures.run.keys import ArrivalDirections, SixNumbers, ThreeNumbers
 
 
@@ -37,7 +37,7 @@ class Reading(RawReadings):
 
     ``gauges_mm`` and ``spread_mm`` are mean and range along base x, y, z; ``joints`` are the mean joint
     variables, mm or deg, and ``directions`` those in which each had arrived. ``temperatures`` are those of
-    the cell's thermometers just afterwards.
+    the cell's thermometers just afterwards, ``part_temperatures`` of legs and base by them.
     """
 
     gauges_mm: ThreeNumbers
@@ -45,6 +45,7 @@ class Reading(RawReadings):
     joints: SixNumbers
     temperatures: tuple[Temperature, ...] = ()
     directions: ArrivalDirections = ()
+    part_temperatures: Temperatures = ()
 
 
 class ReadingSeries(RawReadings):
@@ -62,34 +63,21 @@ def in_words(deviation_mm: Iterable[float]) -> str:
     return ", ".join(f"{axis} {value:+.3f}" for axis, value in zip("xyz", deviation_mm, strict=True))
 
 
-def legs_warmer(
-    thermometers: Iterable[ThermometerSettings], readings: Sequence[Reading], before: Sequence[float | None]
-) -> Array:
-    """By how much each leg (n, 6), K, was warmer at n records than ``before``, deg C a leg.
-
-    0 of a leg without a thermometer. NaN of one whose thermometer never answered, or that has no
-    reference temperature. Where a thermometer once did not answer, the mean of what it showed counts.
-    """
-    warmer = np.zeros((len(readings), LEGS))
-    reference = [*before, *[None] * LEGS][:LEGS]
-    for thermometer in thermometers:
-        shown = _shown(thermometer.name, readings)
-        for leg in thermometer.legs:
-            at_first = reference[leg - 1]
-            warmer[:, leg - 1] = shown - (np.nan if at_first is None else at_first)
-    return warmer
+def on_parts(thermometers: Iterable[ThermometerSettings], shown: Iterable[Temperature]) -> Temperatures:
+    """The temperatures of legs and base by what thermometers showed; empty if none on one did."""
+    celsius = {one.name: one.celsius for one in shown}
+    placed = {place: celsius.get(one.name) for one in thermometers for place in (*one.legs, one.part)}
+    found = tuple(placed.get(place) for place in (*range(1, LEGS + 1), "base"))
+    return found if any(one is not None for one in found) else ()
 
 
 def mean_leg_temperatures(
-    thermometers: Iterable[ThermometerSettings], readings: Sequence[Reading]
+    thermometers: Sequence[ThermometerSettings], readings: Iterable[Reading]
 ) -> tuple[float | None, ...]:
     """The mean temperature of each leg, deg C; None of a leg that has no thermometer, or a silent one."""
-    means: list[float | None] = [None] * LEGS
-    for thermometer in thermometers:
-        shown = _shown(thermometer.name, readings)
-        for leg in thermometer.legs:
-            means[leg - 1] = None if np.isnan(shown).any() or not len(shown) else float(shown.mean())
-    return tuple(means)
+    shown = temperatures_of(on_parts(thermometers, reading.temperatures) for reading in readings)
+    columns = (column[np.isfinite(column)] for column in shown.T[:LEGS])
+    return tuple(float(column.mean()) if len(column) else None for column in columns)
 
 
 def mean_temperature(readings: Iterable[Reading]) -> float | None:
@@ -97,13 +85,3 @@ def mean_temperature(readings: Iterable[Reading]) -> float | None:
     every = [one.celsius for reading in readings for one in reading.temperatures]
     shown = [celsius for celsius in every if celsius is not None]
     return float(np.mean(shown)) if shown else None
-
-
-def _shown(name: str, readings: Sequence[Reading]) -> Array:
-    """What a thermometer showed at n records, gaps filled with the mean; NaN if it never answered."""
-    by_record = [{one.name: one.celsius for one in reading.temperatures}.get(name) for reading in readings]
-    shown = np.array([np.nan if celsius is None else celsius for celsius in by_record])
-    if np.isnan(shown).all():
-        return shown
-    filled: Array = np.where(np.isnan(shown), np.nanmean(shown), shown)
-    return filled

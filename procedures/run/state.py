@@ -5,7 +5,7 @@ What an event changes is in its own file (:mod:`procedures.steps`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -112,6 +112,7 @@ class SetState:
                 joints=reading.joints,
                 deviation=deviation_of(np.subtract(reading.gauges_mm, first.reading.gauges_mm)),
                 directions=reading.directions,
+                temperatures=reading.part_temperatures,
             )
             for number, reading in enumerate((*visits, *closing))
         ]
@@ -313,15 +314,18 @@ class RunState:
             if (zero := self.zero(key)) is not None
         )
 
-    @property
-    def temperature_range_k(self) -> float | None:
-        """The largest range that a thermometer showed with these records; None without readings."""
+    def temperature_range_k(self, but: Collection[str] = ()) -> float | None:
+        """The largest range that a thermometer showed with these records; None without readings.
+
+        ``but``: the names of those that are left out if there are others.
+        """
         shown: dict[str, list[float]] = {}
         for sample in self.samples(Phase.IDENTIFY):
             for temperature in sample.reading.temperatures:
                 if temperature.celsius is not None:
                     shown.setdefault(temperature.name, []).append(temperature.celsius)
-        return max((max(values) - min(values) for values in shown.values()), default=None)
+        counted = shown.keys() - set(but) or shown.keys()
+        return max((max(shown[name]) - min(shown[name]) for name in counted), default=None)
 
     @property
     def verdict(self) -> Verdict | None:

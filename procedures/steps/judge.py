@@ -23,7 +23,6 @@ from hexacell.verdict.verification import (
 from procedures.calibration.held_out_poses import confirming_poses
 from procedures.resources.run_resources import RunResources
 from procedures.run.keys import Phase, SixNumbers
-from procedures.run.readings import legs_warmer
 from procedures.run.state import RunState
 from procedures.steps.base import BaseEvent, Computation
 from procedures.steps.sample import RecordTaken
@@ -97,10 +96,7 @@ def _checked(run: RunResources, state: RunState) -> ResultValidated:
     write_measurements(run.folder.measurements, measurements)
     known, accepted = run.calibration.known(state), run.calibration.accepted
     effects = known.robot_of(state).effects
-    before = () if accepted is None else accepted.leg_temperatures_c
-    shown = [sample.reading for sample in state.samples(Phase.IDENTIFY)]
-    warmer = legs_warmer(run.settings.thermometers, shown, before)
-    found = check_result(known.check, measurements, accepted, effects, warmer)
+    found = check_result(known.check, measurements, accepted, effects)
     return ResultValidated(verdict=found.verdict, line=check_line(found), check=found)
 
 

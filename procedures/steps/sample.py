@@ -94,7 +94,8 @@ def record_of(event: EventAtPose, reading: Reading, deviation_mm: Deviation) -> 
     """The record of what was read at a pose."""
     pose, joints = Pose(*event.pose), reading.joints
     point, orientation = event.at.point, event.orientation
-    return Record(point, orientation, pose, joints, deviation_mm, reading.directions)
+    further = reading.directions, reading.part_temperatures
+    return Record(point, orientation, pose, joints, deviation_mm, *further)
 
 
 async def read_inside(

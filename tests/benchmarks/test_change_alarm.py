@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from hexacell.checks.change_alarm import ChangeAlarm, change_alarm, leg_expansion
+from hexacell.checks.change_alarm import ChangeAlarm, change_alarm
 from hexacell.checks.check import Check
 from hexacell.dry_run.campaign import VirtualCampaign
+from hexacell.identification.thermal_expansion import ThermalExpansion
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
@@ -60,23 +61,22 @@ def checked(job: tuple[int, int, float]) -> Robot:
     leg, number, swing_k = job
     known = calibrated()
     usual, random = known.check(), np.random.default_rng([8, leg, number])
-    steel = usual.settings.uncertainty.model_copy(update={"expansion_legs_um_m_k": STEEL_UM_M_K})
-    check = replace(usual, settings=usual.settings.model_copy(update={"uncertainty": steel}))
+    check = replace(usual, robot=replace(usual.robot, expansion=ThermalExpansion(STEEL_UM_M_K)))
     assert check.before is not None
     factor = np.linalg.cholesky(check.before.covariance)
     change = factor @ random.standard_normal(len(factor))
     if leg:
         change = change + random.choice([-1.0, 1.0]) * CHANGE_MM * by_length(known, leg)
     weather = Weather(random.uniform(0.0, DAY_H), random.uniform(0.0, 3.0, 6), swing_k)
-    alarm = change_alarm(check, *records_of(check, change, weather, random))
+    alarm = change_alarm(check, records_of(check, change, weather, random), (0.0,) * 6)
     assert alarm is not None
     return Robot(leg, alarm)
 
 
 def records_of(
     check: Check, change: Array, weather: Weather, random: np.random.Generator
-) -> tuple[MeasurementSet, Array]:
-    """Records of a robot whose free parameters differ by (p,), and how much warmer its legs are said to be.
+) -> MeasurementSet:
+    """Records of a robot whose free parameters differ by (p,), with thermometers that were at 0 before.
 
     As many even if the check is decided with fewer.
     """
@@ -86,12 +86,14 @@ def records_of(
     campaign = VirtualCampaign(plan, virtual)
     while (record := len(campaign.measurements)) < RECORDS:
         warmer = weather.warmer(record)
-        expansion = leg_expansion(cold, STEEL_UM_M_K, warmer[None])[0]
-        virtual.truth = mechanism.normalize_frames(Geometry(cold.parameters, cold.vector + expansion))[0]
+        longer = cold.vector.copy()
+        longer[cold.parameters.slices["l"]] *= 1.0 + 1e-6 * STEEL_UM_M_K * warmer
+        virtual.truth = mechanism.normalize_frames(Geometry(cold.parameters, longer))[0]
         campaign.step()
         if len(campaign.measurements) > record:
-            told.append(warmer + THERMOMETER_K * random.standard_normal(6))
-    return campaign.measurements, np.array(told)
+            told.append((*(warmer + THERMOMETER_K * random.standard_normal(6)).tolist(), None))
+    pairs = zip(campaign.measurements.records, told, strict=True)
+    return MeasurementSet(tuple(replace(one, temperatures=shown) for one, shown in pairs))
 
 
 def by_length(known: Calibrated, leg: int) -> Array:

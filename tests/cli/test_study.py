@@ -24,7 +24,7 @@ def test_the_paper_is_repeated_and_what_is_known_is_not_computed_again(typed, tm
     assert max(map(len, first.out.splitlines())) <= 80
     assert (tmp_path / "kept" / "paper.svg").read_text().startswith("<svg ")
     kept = results(tmp_path)
-    assert len(kept) == len({json.loads(line)["key"] for line in kept}) == 21
+    assert len(kept) == len({json.loads(line)["key"] for line in kept}) == 10
     again = typed(*PAPER, "--json")
     assert results(tmp_path) == kept
     told = json.loads(again.out)

@@ -24,6 +24,7 @@ from hexacell.identification.problem.commanded_poses import CommandingGeometry
 from hexacell.identification.problem.prior import Noise, Prior, Tolerances
 from hexacell.identification.problem.problem import Assumptions, Problem
 from hexacell.identification.solver.result import Identification
+from hexacell.identification.thermal_expansion import ThermalExpansion
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
@@ -261,6 +262,8 @@ def problem_of(
     noise: Noise = PAPER_NOISE,
     tolerances: Tolerances = PAPER_TOLERANCES,
     provisional: tuple[Geometry, ...] = (),
+    known: Problem | None = None,
+    expansion: ThermalExpansion | None = None,
 ) -> Problem:
     """The identification of some records on the paper's robot."""
     return Assumptions(
@@ -270,7 +273,8 @@ def problem_of(
         prior=Prior.of(Hexaglide(), drawing, tolerances),
         noise=noise,
         provisional=provisional,
-    ).problem(measurements)
+        expansion=expansion or ThermalExpansion(),
+    ).problem(measurements, known)
 
 
 @pytest.fixture(scope="session")

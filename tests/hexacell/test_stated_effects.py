@@ -5,12 +5,13 @@ import pytest
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.cell.uncertainty import UncertaintySettings
+from hexacell.kinematics.parameters import MachinePart
 from hexacell.robot.stated import stated_effects
 from hexacell.uncertainty.effects import Occurrence
 
 CONSTANTS = {
     *("grade", "sources", "rail_wave_short_mm", "rail_wave_long_mm", "leg_compliance_um_n"),
-    *("stop_repeatability_acts", "own_weight_centre_mm", "own_weight_direction"),
+    *("stop_repeatability_acts", "own_weight_centre_mm", "own_weight_direction", "thermometers_k"),
 }
 
 
@@ -67,3 +68,12 @@ def test_thermometers_replace_the_stated_change_of_temperature(ideal) -> None:
     effects = stated_effects(with_sizes(ideal), measured_range_k=0.3)
     (drift,) = (effect for effect in effects if effect.name == "temperature while measuring")
     assert (drift.size, drift.source) == (0.3, "thermometers")
+
+
+def test_what_thermometers_on_legs_do_not_tell_takes_the_place_of_their_expansion(ideal) -> None:
+    stated = with_sizes(ideal, thermometers_k=0.2)
+    alone = {effect.name: effect for effect in stated_effects(stated, 6.0, {MachinePart.LEGS})}
+    assert alone["thermometers of the legs"].size == 0.2
+    assert alone["coefficients of thermal expansion"].size == 10.0
+    assert alone["temperature while measuring"].size == 6.0, "the base may have become as warm"
+    assert "thermometers of the legs" not in {effect.name for effect in stated_effects(stated, 6.0)}

@@ -6,8 +6,9 @@ from functools import partial
 from typing import Any
 
 from drivers.encoders.dbc import PositionSignal, read_signals
+from drivers.simulated.encoders import object_dictionary as od
 from drivers.simulated.encoders.can_bus import PeriodicAction, SimulatedCanBus
-from drivers.simulated.encoders.node import SimulatedEncoder
+from drivers.simulated.encoders.node import COUNTER_OVERFLOW, DIRTY_SCALE, REVERSED, SimulatedEncoder
 from drivers.simulated.encoders.object_dictionary import EVENTS_AND_SYNC, ROTARY, DeviceData, Vendor
 from drivers.simulated.served_device import Closeable, Switch, setting
 from hexacell.cell.described_devices import DbcSettings
@@ -89,16 +90,17 @@ class SimulatedEncoderBank(_CanBank):
 
     def faults(self, leg: int) -> dict[FaultKind, Switch]:
         encoder = self._encoders[leg - 1]
+        step = encoder.data.step
         switches: dict[FaultKind, Switch] = {
             "unplugged": encoder.set_unplugged,
             "silent": setting(encoder, "is_silent"),
             "alarm": encoder.set_alarm,
-            "warning": encoder.set_warning,
-            "two steps": encoder.set_two_steps,
-            "SYNC counter": encoder.set_sync_counter,
+            "warning": partial(encoder.set_object, od.WARNINGS, "<H", DIRTY_SCALE),
+            "two steps": partial(encoder.set_object, od.MEASURING_STEP, "<I", step // 10, step),
+            "SYNC counter": partial(encoder.set_object, od.SYNC_COUNTER, "B", COUNTER_OVERFLOW),
             "switched on again": encoder.switch_on_again,
             "repeated": setting(encoder, "is_doubled"),
-            "reversed": encoder.set_reversed,
+            "reversed": partial(encoder.set_object, od.OPERATING_PARAMETERS, "<H", REVERSED),
             "zeroed": encoder.set_zeroed,
             "frozen": setting(encoder, "is_frozen"),
             "jumped": setting(encoder, "shift", round(JUMP / self._settings.step), 0),

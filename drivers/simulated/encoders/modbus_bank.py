@@ -11,7 +11,7 @@ from drivers.simulated.encoders.bank import JUMP, Positions, shown_positions
 from drivers.simulated.gauges.described import WRITE_REGISTER, answer, refusal, split_requests
 from drivers.simulated.gauges.instruments import Instrument
 from drivers.simulated.gauges.server import LATE_TIMEOUTS, GaugeLineServer, LineFault, LineFaults
-from drivers.simulated.serial_line import PtyLine, SerialLine
+from drivers.simulated.serial_line import PtyLine
 from drivers.simulated.served_device import Closeable, Switch, setting
 from hexacell.cell.described_devices import ModbusEncoderSettings
 from hexacell.cell.devices import EncoderSettings
@@ -100,7 +100,6 @@ class SimulatedModbusBank(Closeable):
         clock: CellClock,
         latency_s: float = 0.0,
         *,
-        line: SerialLine | None = None,
         has_gaps: bool = True,
     ) -> None:
         self._settings, self._positions = settings, positions
@@ -108,7 +107,7 @@ class SimulatedModbusBank(Closeable):
         self._faulty = scales.scales
         self._served = GaugeLineServer(
             scales,
-            line or PtyLine("encoders"),
+            PtyLine("encoders"),
             clock,
             latency_s=latency_s,
             faults=LineFaults(LATE_TIMEOUTS * settings.timeout_s),

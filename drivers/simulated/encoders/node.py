@@ -79,34 +79,21 @@ class SimulatedEncoder:
             self._bus.subscribe(_NMT, self._on_nmt)
             self.boot()
 
-    def set_reversed(self, *, on: bool) -> None:
-        """Count in the other direction, or as it should."""
-        self._set(object_dictionary.OPERATING_PARAMETERS, struct.pack("<H", REVERSED * on))
+    def set_object(self, index: int, form: str, faulty: int, sound: int = 0, *, on: bool) -> None:
+        """Have a faulty value in an object, or a sound one; nothing is sent."""
+        self._node.set_data(index, 0, struct.pack(form, faulty if on else sound))
 
     def set_zeroed(self, *, on: bool) -> None:
         """Press the preset: the present position becomes 0; what it did stays."""
         if on:
             self.shift -= self.counts
-            self._set(object_dictionary.OFFSET, struct.pack("<i", self.shift))
-
-    def set_two_steps(self, *, on: bool) -> None:
-        """Report two measuring steps, one a tenth of the other, or one."""
-        self._set(object_dictionary.MEASURING_STEP, struct.pack("<I", self.data.step // (10 if on else 1)))
-
-    def set_sync_counter(self, *, on: bool) -> None:
-        """Want a counter in each SYNC, or none."""
-        self._has_reported_sync = False
-        self._set(object_dictionary.SYNC_COUNTER, bytes((COUNTER_OVERFLOW * on,)))
+            self.set_object(object_dictionary.OFFSET, "<i", self.shift, on=True)
 
     def switch_on_again(self, *, on: bool) -> None:
         """Boot, as after a loss of its supply."""
         if on and self._node.has_network():
             self._stop_event_timers()
             self.boot()
-
-    def set_warning(self, *, on: bool) -> None:
-        """Set a warning, as of a dirty scale, or clear it; nothing is sent."""
-        self._set(object_dictionary.WARNINGS, bytes((DIRTY_SCALE * on, 0)))
 
     def sample(self, counts: int) -> None:
         if not self.is_frozen:
@@ -116,7 +103,7 @@ class SimulatedEncoder:
     def set_alarm(self, *, on: bool) -> None:
         """Report that there is no magnet, or that it is back, and set the error register."""
         code, register = (NO_MAGNET, POSITION_ERROR) if on else (0, 0)
-        self._set(object_dictionary.ERROR_REGISTER, bytes((register,)))
+        self.set_object(object_dictionary.ERROR_REGISTER, "B", register, on=True)
         self._send_emergency(code, register)
 
     def boot(self) -> None:
@@ -144,15 +131,13 @@ class SimulatedEncoder:
         if self.is_operational:
             self._bus.send_message(cob_id, data)
 
-    def _set(self, index: int, data: bytes) -> None:
-        self._node.set_data(index, 0, data)
-
     def _send_emergency(self, code: int, register: int) -> None:
         self._bus.send_message(0x80 + self.data.node, struct.pack("<HB5x", code, register))
 
     def _misses_counter(self) -> bool:
         """Whether it wants a counter in the SYNC, which this bus never has; reported once."""
         if not self._value(object_dictionary.SYNC_COUNTER, 0):
+            self._has_reported_sync = False
             return False
         if not self._has_reported_sync:
             self._has_reported_sync = True

@@ -47,10 +47,10 @@ class LineFault(StrEnum):
 class LineFaults:
     """The faults of one line that are on. Used by the thread of the line; switched from any."""
 
-    def __init__(self, late_s: float, seed: int = 1) -> None:
+    def __init__(self, late_s: float) -> None:
         self._late_s = late_s
         self._on: set[LineFault] = set()
-        self._random = np.random.default_rng(seed)
+        self._random = np.random.default_rng(1)
         self._answers = 0
         self._latest = b""
 

@@ -1,7 +1,6 @@
 """Parsing of one MDI block: rapid moves, moves at a feed or of a duration, LinuxCNC's error messages."""
 
 import math
-import operator
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -30,21 +29,13 @@ class BlockError(Exception):
 class ModalState:
     """What a block leaves to those after it: G0, G1 or G80, G93 or G94, and the feed of G94, mm/min.
 
-    ``work_offset`` is that of the coordinate system (G10 L2), and ``rotation_deg`` its rotation about z,
-    which no query shows; ``offset`` is added to it (G92).
+    ``offset`` is that of the coordinate system (G54, G92), mm and deg: the answer to ``get pos_offset``.
     """
 
     motion: int = 0
     feed_mode: int = PER_MINUTE
     feed: float = 0.0
-    rotation_deg: float = 0.0
-    work_offset: tuple[float, ...] = _NOWHERE
     offset: tuple[float, ...] = _NOWHERE
-
-    @property
-    def offsets(self) -> tuple[float, ...]:
-        """The answer to ``get pos_offset``, mm and deg."""
-        return tuple(map(operator.add, self.work_offset, self.offset))
 
     @property
     def codes(self) -> str:
@@ -85,22 +76,11 @@ def parse_block(block: str, current: Pose, modes: ModalState | None = None) -> P
     after = _modes_after(codes, feed, before)
     if not numbers and 1.0 not in codes:
         return ParsedBlock(after)
-    system = ModalState() if _MACHINE_COORDINATES in codes else after
-    unshifted = map(operator.sub, current.as_tuple(), system.offsets)
-    here = _rotated(Pose(*unshifted), -system.rotation_deg)  # in the coordinate system
-    stated = zip(_AXES, here.as_tuple(), strict=True)
-    turned = _rotated(Pose(*(numbers.get(axis, value) for axis, value in stated)), system.rotation_deg)
-    target = Pose(*map(operator.add, turned.as_tuple(), system.offsets))
+    shifts = _NOWHERE if _MACHINE_COORDINATES in codes else after.offset
+    here = zip(_AXES, current.as_tuple(), shifts, strict=True)
+    target = Pose(*(numbers[axis] + shift if axis in numbers else value for axis, value, shift in here))
     duration_s = _duration(after, feed, current, target)
     return ParsedBlock(after, target, duration_s) if numbers else ParsedBlock(after)
-
-
-def _rotated(pose: Pose, degrees: float) -> Pose:
-    if degrees == 0.0:
-        return pose
-    sine, cosine = math.sin(math.radians(degrees)), math.cos(math.radians(degrees))
-    x, y, *rest = pose.as_tuple()
-    return Pose(cosine * x - sine * y, sine * x + cosine * y, *rest)
 
 
 def _modes_after(codes: Sequence[float], feed: float | None, before: ModalState) -> ModalState:

@@ -223,7 +223,7 @@ _GET: dict[str, Callable[[_Client], str]] = {
     "JOINT_HOMED": lambda client: " ".join([_answer(client.state.homed)] * 6),
     "JOINT_POS": lambda client: _numbers(client.state.machine.joints(), client.settings.joint_unit_mm),
     "ABS_ACT_POS": lambda client: _position(client, client.state.machine.pose().as_tuple()),
-    "POS_OFFSET": lambda client: _position(client, client.state.modes.offsets),
+    "POS_OFFSET": lambda client: _position(client, client.state.modes.offset),
     "PROGRAM_CODES": lambda client: client.state.modes.codes,
     "FEED_OVERRIDE": lambda client: f"{client.state.feed_override_percent:g}",
     "USER_LINEAR_UNITS": lambda client: UNITS.get(client.settings.unit_mm, "CUSTOM"),

@@ -4,8 +4,8 @@ import argparse
 
 from hexacell import __version__
 from hexacell.cli.arguments.commands import Parser
-from hexacell.cli.arguments.operation import add_operation_commands
-from hexacell.cli.arguments.runs import add_run_commands, add_study_commands
+from hexacell.cli.arguments.operation import OPERATION_COMMANDS, RESULT_COMMANDS
+from hexacell.cli.arguments.runs import RUN_COMMANDS, STUDY_COMMANDS
 
 EXIT_CODES = """exit codes:
   0 done, within limits            4 an answer or approval is needed
@@ -33,7 +33,6 @@ def make_parser() -> Parser:
     commands = parser.add_subparsers(
         title="commands", prog="hexacell", metavar="COMMAND [...]", required=True
     )
-    add_run_commands(commands)
-    add_operation_commands(commands)
-    add_study_commands(commands)
+    for add in (*RUN_COMMANDS, *RESULT_COMMANDS, *OPERATION_COMMANDS, *STUDY_COMMANDS):
+        add(commands)
     return parser

@@ -19,14 +19,7 @@ from hexacell.cli.arguments.commands import (
 SHELLS = ("bash", "zsh", "fish")
 
 
-def add_operation_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
-    """Add these commands to a parser."""
-    results = (_apply, _rollback, _history, _report)
-    for add in (*results, _devices, _schedule, _status, _notify, _serve, _cell, _completion):
-        add(commands)
-
-
-def _devices(commands: Any) -> None:  # noqa: ANN401
+def _devices(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
     parser = add_command(commands, "devices", "find gauges, encoders, a controller; text for a cell file")
     words = "serial ports or URLs (default: all of this computer)"
     parser.add_argument("ports", nargs="*", metavar="PORT", help=words)
@@ -166,3 +159,8 @@ def _report(commands: Any) -> None:  # noqa: ANN401
     )
     add_value(parser, "--compare", "RUN", "say also what has changed since this run, a folder", Path)
     parser.add_json()
+
+
+RESULT_COMMANDS = (_apply, _rollback, _history, _report)
+OPERATION_COMMANDS = (_devices, _schedule, _status, _notify, _serve, _cell, _completion)
+"""What adds them to a parser."""

@@ -15,13 +15,7 @@ from hexacell.cli.arguments.commands import (
 )
 
 
-def add_run_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
-    """Add these commands to a parser."""
-    for add in (_demo, _run, _tui, _length, _preflight, _simulate, _host, _next, _fit, _replay):
-        add(commands)
-
-
-def _demo(commands: Any) -> None:  # noqa: ANN401
+def _demo(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
     parser = add_command(
         commands, "demo", "do the whole job on a simulated cell, nothing attached", "run.demo"
     )
@@ -143,8 +137,7 @@ STUDIES = (
 """Name, summary, and what is drawn; each is a row of ``hexacell.cli.commands.study``, slow to import."""
 
 
-def add_study_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
-    """Add the studies to the commands of a parser."""
+def _studies(commands: Any) -> None:  # noqa: ANN401
     parser = add_parser(commands, "study", "repeat what was published of the method, on simulated robots")
     studies = parser.add_subparsers(title="studies", metavar="STUDY", required=True)
     for name, summary, drawn in STUDIES:
@@ -163,3 +156,8 @@ def _add_study(studies: Any, name: str, summary: str, drawn: str) -> None:  # no
     words = "keeps each result, so that a study can be interrupted, and gets a picture"
     add_value(parser, "--folder", "FOLDER", words, Path, Path("hexacell-study"))
     parser.add_json()
+
+
+RUN_COMMANDS = (_demo, _run, _tui, _length, _preflight, _simulate, _host, _next, _fit, _replay)
+STUDY_COMMANDS = (_studies,)
+"""What adds them to a parser."""

@@ -103,7 +103,6 @@ def _watch(options: argparse.Namespace, console: Console) -> ExitCode:
 
 
 def _bus(words: str) -> dict[str, Any]:
-    """Settings of a bus from ``interface=slcan,channel=/dev/ttyACM0,bitrate=500000``."""
     pairs = [word.partition("=") for word in words.split(",")]
     if not all(name and value for name, _, value in pairs):
         raise UsageError(
@@ -114,7 +113,6 @@ def _bus(words: str) -> dict[str, Any]:
 
 
 def _address(words: str) -> tuple[str, int]:
-    """Host and port from ``HOST:PORT``."""
     host, _, port = words.rpartition(":")
     if not host or not port.isdecimal() or not 0 < int(port) < TCP_PORTS:
         raise UsageError(f"--controller {words} is not an address", action="Write it like 127.0.0.1:5007")

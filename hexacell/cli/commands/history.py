@@ -13,7 +13,7 @@ from hexacell.errors import ExitCode, UsageError
 from hexacell.results.run_comparison import ParameterTrend, RunComparison
 from hexacell.runs.run_folder import RunFolder, find_run
 from hexacell.services.history.cell_status import fleet_runs
-from hexacell.services.history.drift_history import DriftHistory, FoundChange, drift_history
+from hexacell.services.history.drift_history import DriftHistory, drift_history
 from hexacell.services.history.past_runs import (
     compare_runs,
     delete_runs,
@@ -71,7 +71,6 @@ def _index(cell: Cell, options: argparse.Namespace, console: Console) -> RunInde
 
 
 def _fleet(options: argparse.Namespace, console: Console) -> ExitCode:
-    """The runs of all cells of an archive."""
     named = (options.compare, options.show, options.keep)
     is_one_cells = options.drift or options.changes or any(one is not None for one in named)
     if options.archive is None or is_one_cells:
@@ -99,7 +98,6 @@ def _keep(cell: Cell, options: argparse.Namespace, console: Console) -> None:
 
 
 def _changes(cell: Cell, console: Console) -> None:
-    """Every write into the config."""
     found = config_history(cell)
     for line in found.damaged:
         console.warn(f"{found.path}, line {line}: this record is torn, damaged or newer, and left out")
@@ -139,14 +137,17 @@ def _drift_document(found: Sequence[ParameterTrend], watched: DriftHistory) -> d
         "parameters": [{**asdict(one), "walking": one.is_walking} for one in found],
         "runs": watched.runs,
         "temperatures_c": watched.celsius,
-        "changes": [_change_document(one) for one in watched.changes],
+        "changes": [
+            asdict(one)
+            | {
+                "leg": one.possible_legs[0],
+                "parameter": one.parameter.name,
+                "unit": one.parameter.kind.unit,
+            }
+            for one in watched.changes
+        ],
         "shares_of_limit": dict(watched.shares),
     }
-
-
-def _change_document(found: FoundChange) -> dict[str, Any]:
-    parameter = {"parameter": found.parameter.name, "unit": found.parameter.kind.unit}
-    return asdict(found) | {"leg": found.leg, **parameter}
 
 
 def _write_document(write: ConfigWrite) -> dict[str, Any]:

@@ -177,7 +177,7 @@ def execute_run(request: RunRequest, console: Console, further: Sequence[Listene
         if may_still_move(error):  # before anything else is said
             console.error(str(error).partition("\n")[0])
         if progress.has_started:
-            console.print(resume_hint(request))
+            console.print(f"Stopped; what was measured is kept. To continue:\n  {resume_command(request)}")
         if (progress.has_started or request.resume) and state_of(request.folder).is_unverified:
             console.error(UNVERIFIED)
         raise
@@ -204,11 +204,6 @@ async def _calibrate(
         listeners: list[Listener] = [*further, progress, keys, watching.note]
         run = calibrate(request, listeners, queue, watching.live, watching.follow)
         return await keys.listen_during(run)
-
-
-def resume_hint(request: RunRequest) -> str:
-    """How to resume a run that was stopped."""
-    return f"Stopped; what was measured is kept. To continue:\n  {resume_command(request)}"
 
 
 def resume_command(request: RunRequest) -> str:

@@ -220,7 +220,6 @@ def written_schedule_text(schedule: Schedule, run: ScheduledRun, stated: Unatten
 
 
 def _again(run: ScheduledRun, stated: UnattendedSettings) -> str:
-    """What is tried again where the run cannot begin."""
     if stated.window_minutes:
         return (
             f"Where it cannot begin (a device, the lock, quiet hours) it is tried again every "
@@ -235,7 +234,6 @@ def _again(run: ScheduledRun, stated: UnattendedSettings) -> str:
 
 
 def _ending(run: ScheduledRun, stated: UnattendedSettings) -> str:
-    """How it ends when it lasts too long."""
     stopped = f"{run.longest_minutes} minutes it is stopped in place and can be resumed. "
     if stated.longest_minutes is None:
         return f"After {stopped}"

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexacell.errors import IdentifiabilityError
-from hexacell.identification.placement import RecordPlacement
+from hexacell.identification.placement import Placement, RecordPlacement
 from hexacell.identification.problem.commanded_poses import (
     CommandedPoses,
     CommandingGeometry,
@@ -22,12 +22,13 @@ from hexacell.identification.problem.commanded_poses import (
 from hexacell.identification.problem.prior import Noise, Prior, SystematicModel, no_systematic_errors
 from hexacell.identification.terms.taken import TakenTerms
 from hexacell.identification.terms.term import ModelTerm
+from hexacell.identification.thermal_expansion import ThermalExpansion
 from hexacell.kinematics.forward import ForwardResult
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.measurements.records import Deviation, MeasurementSet, RecordId
+from hexacell.measurements.records import Deviation, MeasurementSet, RecordId, Temperatures
 
 LEAST_SPARE_EQUATIONS = 13
 """Equations beyond the parameters from which agreement is a proof: fewer agree by chance."""
@@ -46,7 +47,9 @@ class Problem:
     """Records in the frame convention, sorted by point.
 
     Attributes:
-        joints: (n, 6), mm, measured by the encoders.
+        joints: (n, 6), mm, measured by the encoders, as they would be with parts as warm as the geometry's.
+        warmer: (n, 7), K, by how much legs and base were warmer than that.
+        holds_at: the temperatures of the geometry.
         deviations: (n, 3), mm, in the convention's base frame.
         directions: (n, 6) from which side each joint arrived, 1 or -1; 0 where that is not known.
         first_rows: (m,) row at which each point begins.
@@ -73,6 +76,8 @@ class Problem:
     joints: Array
     deviations: Array
     directions: Array
+    warmer: Array
+    holds_at: Temperatures
     first_rows: NDArray[np.intp]
     commands: CommandedPoses
     initial_parameters: Array
@@ -144,7 +149,7 @@ class Problem:
     def measured_at(self, free: Array, poses: PoseBatch) -> RecordPlacement:
         """The robot at the records under free parameters (p,), mm, that give them these poses."""
         geometry = self.geometry(free)
-        readings = self.joints, self.deviations, self.gauges, self.directions
+        readings = self.joints, self.deviations, self.gauges, self.directions, self.warmer
         return RecordPlacement(self.mechanism, geometry, poses, *readings)
 
     def residuals(self, positions: Array) -> Array:
@@ -217,6 +222,7 @@ class Problem:
             joints=self.joints[kept],
             deviations=self.deviations[kept],
             directions=self.directions[kept],
+            warmer=self.warmer[kept],
             first_rows=first_rows_of(self.labels[kept, 0]),
             commands=self.commands[kept],
             start=self.start[kept],
@@ -241,6 +247,7 @@ class Problem:
             joints=np.concatenate([self.joints, other.joints])[order],
             deviations=np.concatenate([self.deviations, other.deviations])[order],
             directions=np.concatenate([self.directions, other.directions])[order],
+            warmer=np.concatenate([self.warmer, other.warmer])[order],
             first_rows=first_rows_of(labels[order, 0]),
             commands=commands[order],
             start=PoseBatch.joined([self.start, other.start])[order],
@@ -265,6 +272,7 @@ class Assumptions:
             while; the last one was used last.
         earlier: geometries that may have commanded records from before the last calibration, in frames of
             their own.
+        expansion: by temperature, and how warm the sought geometry is.
     """
 
     mechanism: Mechanism
@@ -279,6 +287,7 @@ class Assumptions:
     travel_mm: Deviation = NO_TRAVEL_MM
     offered: tuple[ModelTerm, ...] = ()
     known_terms: tuple[ModelTerm, ...] = ()
+    expansion: ThermalExpansion = field(default_factory=ThermalExpansion)
 
     def problem(self, measurements: MeasurementSet, known: Problem | None = None) -> Problem:
         """The problem of a measurement set.
@@ -287,7 +296,7 @@ class Assumptions:
             measurements: n records in any order.
             known: the problem of some of these records. A record does not change how those before it were
                 commanded, nor their start poses; these are taken over and computed for the new records
-                alone.
+                alone, unless it changes what is known of the temperatures before it.
 
         Raises:
             IdentifiabilityError: joint variables do not belong to the commanded poses, or for most records
@@ -302,9 +311,14 @@ class Assumptions:
         if known is not None and not known.commands.are_of(candidates):
             known = None
         rows = np.full(len(labels), -1) if known is None else known.rows_of(labels)
+        warmer = self.expansion.warmer(measurements)[order]
+        if known is not None and not np.array_equal(known.warmer[rows[rows >= 0]], warmer[rows >= 0]):
+            known, rows = None, np.full(len(labels), -1)
         new = measurements.subset(order[rows < 0])
-        joints, deviations = new.joints, frames.deviations(new.deviations)
-        commands = CommandedPoses.of(mechanism, new.poses, candidates, self.branch, joints)
+        deviations = frames.deviations(new.deviations)
+        commands = CommandedPoses.of(mechanism, new.poses, candidates, self.branch, new.joints)
+        placed = Placement(mechanism, self.prior.centre, commands.poses, new.joints)
+        joints = self.expansion.joints_without(placed, warmer[rows < 0])
         if known is not None:
             joints = _interleaved(known.joints, rows, joints)
             deviations = _interleaved(known.deviations, rows, deviations)
@@ -327,6 +341,8 @@ class Assumptions:
             joints=joints,
             deviations=deviations,
             directions=measurements.directions[order],
+            warmer=warmer,
+            holds_at=self.expansion.holds_at(measurements),
             first_rows=first_rows_of(labels[:, 0]),
             commands=commands,
             initial_parameters=free,

@@ -61,8 +61,7 @@ class WithEncoderScales(Mechanism):
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
         actual = self.exact.inverse(self.without_scales(geometry), branch, poses)
-        shown: Array = actual / (1.0 + geometry["encoder_scale"])
-        return shown
+        return actual / (1.0 + geometry["encoder_scale"])
 
     def branch(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
         return self.exact.branch(self.without_scales(geometry), poses, _actual(geometry, joints))
@@ -101,5 +100,4 @@ class WithEncoderScales(Mechanism):
 
 def _actual(geometry: Geometries, joints: Array) -> Array:
     """The joint variables (n, 6) of those that the encoders show."""
-    actual: Array = joints * (1.0 + geometry["encoder_scale"])
-    return actual
+    return joints * (1.0 + geometry["encoder_scale"])

@@ -104,8 +104,7 @@ class GoughStewart(JointedLegs):
     base_joint, platform_joint, length = "base", "platform", "offset"
 
     def lengths(self, geometry: Geometries, joints: Array) -> Array:
-        lengths: Array = geometry["offset"] + joints
-        return lengths
+        return geometry["offset"] + joints
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
         """Joint variables (n, 6) at n poses; every pose has a solution."""
@@ -183,8 +182,7 @@ class ScrewLegs(GoughStewart):
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
         without = super().inverse(geometry, branch, poses)
-        joints: Array = without + self._corrections(geometry, poses)[1].added
-        return joints
+        return without + self._corrections(geometry, poses)[1].added
 
     def _corrections(self, geometry: Geometries, poses: PoseBatch) -> tuple[Array, _Corrections]:
         """R b_i (n, 6, 3), mm, and the corrections."""

@@ -115,8 +115,7 @@ class RotaryCranks(JointedLegs):
 
     def base_ends(self, geometry: Geometries, joints: Array) -> Array:
         axes, (cosine, sine) = TurnedAxes.by(geometry["axis"]), _cosine_and_sine(geometry, joints)
-        ends: Array = geometry["centre"] + geometry["crank"][..., None] * (axes.u * cosine + axes.w * sine)
-        return ends
+        return geometry["centre"] + geometry["crank"][..., None] * (axes.u * cosine + axes.w * sine)
 
     def derivatives_at_base(self, geometry: Geometry, joints: Array, n: Array) -> tuple[Array, list[Array]]:
         axes, crank = TurnedAxes.by(geometry["axis"]), geometry["crank"]
@@ -136,8 +135,7 @@ class RotaryCranks(JointedLegs):
         cosine = wanted / np.hypot(across[..., 0], across[..., 1])
         away = np.arccos(np.where(np.abs(cosine) <= 1.0, cosine, np.nan))
         angles = np.arctan2(across[..., 1], across[..., 0]) + np.asarray(branch) * away
-        joints: Array = _wrapped(np.degrees(angles) - geometry["zero"])
-        return joints
+        return _wrapped(np.degrees(angles) - geometry["zero"])
 
     def branch(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
         across, _ = self._in_plane(geometry, poses)
@@ -185,5 +183,4 @@ def _cosine_and_sine(geometry: Geometries, joints: Array) -> tuple[Array, Array]
 
 def _wrapped(degrees: Array) -> Array:
     """Angles less whole turns, within half a turn of 0, deg."""
-    wrapped: Array = (degrees + 180.0) % 360.0 - 180.0
-    return wrapped
+    return (degrees + 180.0) % 360.0 - 180.0

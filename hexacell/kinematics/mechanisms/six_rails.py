@@ -70,8 +70,7 @@ class SixRails(JointedLegs):
     opposite = "a slider counts the opposite way of slider 1"
 
     def base_ends(self, geometry: Geometries, joints: Array) -> Array:
-        ends: Array = geometry["S"] + joints[..., None] * _directions(geometry)
-        return ends
+        return geometry["S"] + joints[..., None] * _directions(geometry)
 
     def derivatives_at_base(self, geometry: Geometry, joints: Array, n: Array) -> tuple[Array, list[Array]]:
         axes = TurnedAxes.by(geometry["rail"])

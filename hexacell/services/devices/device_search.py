@@ -48,11 +48,8 @@ async def search_devices(
 ) -> SearchFindings:
     """Ask at every place, all ports at once; takes some seconds.
 
-    Args:
-        named_ports: serial ports or pyserial URLs; all of this computer if there are none.
-        named_buses: settings of CAN buses beside those that are found.
-        controller: host and port.
-        timeouts: longest waits.
+    Without ``named_ports``, which may be pyserial URLs, these are all of this computer. ``named_buses`` are
+    settings of CAN buses beside those that are found; ``controller`` is a host and a port.
     """
     ports = tuple(SerialPortFound(port, port, "") for port in named_ports) or serial_ports()
     factories = {name: load(Group.GAUGES, name) for name in names(Group.GAUGES)}
@@ -104,11 +101,6 @@ def found_bank(found: SearchFindings) -> tuple[BusFindings, tuple[FoundNode, ...
         if encoders := tuple(node for node in bus.nodes if node.unit is not None):
             return bus, encoders
     return None
-
-
-def unknown_encoders(found: SearchFindings) -> BusFindings | None:
-    """The first bus with frames of no CANopen node, which may be those of encoders."""
-    return next((bus for bus in found.buses if bus.frames), None)
 
 
 def gauge_keys(gauge: FoundGauge) -> Document:

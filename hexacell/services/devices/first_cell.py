@@ -130,7 +130,6 @@ def _put_points(document: Document, given: str) -> None:
 
 
 def _gauge_answers(number: int) -> Iterator[CellAnswer]:
-    """One gauge: what it speaks, where, and which way it counts."""
     axis, place = GAUGE_AXES[number], ("gauges", number)
     yield CellAnswer(f"protocol {axis}", (*place, "protocol"), "sylvac", _protocol)
     yield CellAnswer(f"port {axis}", (*place, "port"), f"/dev/ttyUSB{number}")

@@ -46,11 +46,6 @@ class FoundChange:
     moved_again: int
     last_noticed: datetime
 
-    @property
-    def leg(self) -> int:
-        """The leg that changed most likely."""
-        return self.possible_legs[0]
-
 
 @dataclass(frozen=True, slots=True)
 class DriftHistory:

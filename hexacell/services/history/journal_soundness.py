@@ -56,14 +56,10 @@ OF_PILOTS = (Move, Pilot, events.Arrived, events.PilotTaken, events.RecordReject
 def require_sound(
     history: Iterable[events.Event], settings: CellSettings, journal: Path, *, follows_plan: bool = True
 ) -> RunState:
-    """The state after a recorded history of a run of a cell.
+    """The state after a recorded history of a run of a cell, which ``journal`` keeps.
 
-    Args:
-        history: the events.
-        settings: of the cell.
-        journal: where they are kept.
-        follows_plan: the whole run is used, and the cell file is as it was; otherwise only numbers are
-            used, and the points of the cell file may be others by now.
+    If it ``follows_plan`` the whole run is used, and the cell file is as it was; otherwise only numbers are
+    used, and the points of the cell file may be others by now.
 
     Raises:
         FileError: an event cannot be of such a run; with its line.
@@ -250,7 +246,6 @@ class _Event:
 
 
 def _range_problems(ranges: Sequence[tuple[float, float] | None] | None, what: str) -> Iterator[str]:
-    """Of joints or of axes."""
     if ranges is not None:
         if len(ranges) != LEGS:
             yield f"there are six {what}"

@@ -11,10 +11,8 @@ from hexacell.cell.loader import load_cell
 from hexacell.cell.model import CellSettings
 from hexacell.config.change import AFTER, BEFORE
 from hexacell.errors import FileError, UsageError
-from hexacell.kinematics.geometry import Geometry
 from hexacell.runs.run_folder import CELL_FILE, JOURNAL, MEASUREMENTS, RESULT, RunFolder
 from hexacell.services.history.journal_soundness import read_sound
-from hexacell.services.history.recorded_cell import geometry_before
 from hexacell.storage import atomic_files
 from procedures.run.state import RunState
 from procedures.steps import events
@@ -56,11 +54,6 @@ class ReportedRun:
         return self.state.started
 
     @property
-    def geometry_before(self) -> Geometry:
-        """The controller's geometry when the run began, in the mechanism's frame convention."""
-        return geometry_before(self.settings, self.started)
-
-    @property
     def identifier(self) -> str:
         """Unique name of this report: cell, run, and a part of the journal's fingerprint."""
         digits = self.fingerprints[JOURNAL][:IDENTIFIER_DIGITS]
@@ -68,13 +61,7 @@ class ReportedRun:
 
 
 def reported_run(run: Path) -> ReportedRun:
-    """Read a run folder.
-
-    Args:
-        run: the folder of a run that is over, or was interrupted.
-
-    Returns:
-        The run as its report needs it.
+    """The run in a folder, which is over, or was interrupted.
 
     Raises:
         UsageError: it is no run folder, or nothing happened in the run.

@@ -42,7 +42,6 @@ def export_run(run: Path, target: Path) -> tuple[str, ...]:
 
 
 def _files(folder: RunFolder) -> Iterator[tuple[str, bytes]]:
-    """The files of the copy: name and content."""
     yield folder.journal.name, atomic_files.read_bytes(folder.journal)
     for name in (CELL_FILE, *_configs(folder.path)):
         if (text := _kept(folder, name)) is not None:
@@ -56,7 +55,6 @@ def _files(folder: RunFolder) -> Iterator[tuple[str, bytes]]:
 
 
 def _configs(folder: Path) -> Iterator[str]:
-    """The names of the versions of the config that a run keeps."""
     for one in (folder, folder / PROVISIONAL_FOLDER):
         for path in sorted(one.iterdir()) if one.is_dir() else ():
             if _CONFIG.fullmatch(path.name):

@@ -2,16 +2,16 @@
 
 from collections.abc import Container, Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
 from hexacell.cell.model import CellSettings
-from hexacell.checks.change_alarm import leg_expansion, machine_records
+from hexacell.checks.change_alarm import has_silent_leg, machine_records
 from hexacell.config.change import RECEIPT, Receipt
 from hexacell.errors import HexacellError, UsageError
-from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
-from hexacell.measurements.records import MeasurementSet, RecordId
+from hexacell.measurements.records import MEASURED_PARTS, MeasurementSet, RecordId
 from hexacell.results.result import IdentificationResult
 from hexacell.runs.run_folder import RunFolder, read_attempts
 from hexacell.services.history.journal_soundness import read_sound
@@ -21,7 +21,7 @@ from hexacell.services.write_back.proposals import later_approval
 from procedures.calibration.calibration import Calibration, Mode
 from procedures.journal.journal import Entry, read_entries, read_journal
 from procedures.run.keys import Phase
-from procedures.run.readings import legs_warmer, mean_temperature
+from procedures.run.readings import mean_temperature, on_parts
 from procedures.run.state import RunState, fold
 from procedures.steps import events
 
@@ -130,13 +130,14 @@ def evidence_document(settings: CellSettings, folder: RunFolder) -> EvidenceDocu
         if not samples:
             return None
         readings = [one.reading for one in samples]
-        warmer = legs_warmer(settings.thermometers, readings, [REFERENCE_C] * LEGS)
-        geometry = settings.mechanism.convention.geometry(free)
-        expansion = leg_expansion(geometry, settings.uncertainty.expansion_legs_um_m_k, warmer)
-        if np.isnan(expansion).any():
+        shown = [on_parts(settings.thermometers, reading.temperatures) for reading in readings]
+        measured = zip(samples, shown, strict=True)
+        told = MeasurementSet(tuple(replace(one.record, temperatures=row) for one, row in measured))
+        if has_silent_leg(settings, told):
             return None
-        measurements = MeasurementSet(tuple(one.record for one in samples))
-        records = machine_records(calibration.known(state).robot_of(state), measurements, free, expansion)
+        robot = calibration.known(state).robot_of(state)
+        at_reference = replace(robot.expansion, reference_c=(REFERENCE_C,) * MEASURED_PARTS)
+        records = machine_records(replace(robot, expansion=at_reference), told, free)
     except (HexacellError, np.linalg.LinAlgError):  # records that fit no robot near this one
         return None
     return EvidenceDocument.of(entries[-1].at, mean_temperature(readings), len(free), records.evidence)

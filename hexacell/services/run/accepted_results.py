@@ -84,7 +84,9 @@ def _result(
         identified=result.geometry if terms else None,
         terms=terms,
         length=_length(state),
-        leg_temperatures_c=mean_leg_temperatures(cell.settings.thermometers, readings),
+        leg_temperatures_c=(
+            result.holds_at_c or mean_leg_temperatures(cell.settings.thermometers, readings)
+        ),
     )
 
 

@@ -131,11 +131,7 @@ async def calibrate(
 async def _checked_devices(
     cell: Cell, calibration: Calibration, folder: Path, unattended: bool
 ) -> AsyncIterator[Connected]:
-    """Connect the devices; ``folder`` is where the run is kept.
-
-    Raises:
-        HexacellError: every failure of the plan, the devices, the stop input and the disk, in one report.
-    """
+    """Connect the devices, or report every failure of plan, devices, stop input and disk at once."""
     failures = await plan_failures(calibration, unattended=unattended)
     if cell.settings.simulation is not None:
         # A simulated robot starts at its first point and cannot be served if that is out of reach.
@@ -221,12 +217,7 @@ def run_started(
 
 
 def _resumed_start(request: RunRequest) -> events.RunStarted:
-    """The first event of the run to resume.
-
-    Raises:
-        UsageError: it is over, or the cell file has changed since it began.
-        FileError: its journal cannot be read, or its folder is not that of a run of this cell.
-    """
+    """The first event of the run to resume, if that can be resumed as it is requested."""
     history = read_journal(request.folder.journal)
     state = fold(history)
     if state.started is None:

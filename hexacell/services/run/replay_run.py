@@ -26,12 +26,9 @@ POSES = "poses.csv"
 
 
 async def replay(run: Path, scope: Scope = Scope.ALL, tolerance: float = TOLERANCE) -> ReplayReport:
-    """Put a recorded run through the procedure again and compare.
+    """Put a recorded run, by its folder or journal, through the procedure again and compare.
 
-    Args:
-        run: a run folder, or a journal.
-        scope: what is repeated.
-        tolerance: allowed difference of a number, in its unit; relative above 1.
+    ``tolerance`` is the allowed difference of a number, in its unit; relative above 1.
 
     Raises:
         FileError: the journal, or the cell file in it, cannot be read.

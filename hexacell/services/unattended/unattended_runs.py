@@ -48,18 +48,9 @@ def refuse_quiet_hours(settings: CellSettings, at: datetime) -> None:
 
 
 def refused_start(request: RunRequest, error: HexacellError, began: datetime, at: datetime) -> float | None:
-    """Note that a run could not begin, where the history finds it.
+    """Note for the history that a run could not begin; gives seconds until the next try, if there is one.
 
-    A disk that takes no note does not change what is reported.
-
-    Args:
-        request: the run.
-        error: why it could not begin.
-        began: when it was tried first.
-        at: when it was refused.
-
-    Returns:
-        Seconds until the next try; None where there is no further one.
+    It was tried first when it ``began``. A disk that takes no note does not change what is reported.
     """
     _note_refusal(request.folder, request.mode.value, error, at)
     wanted = request.cell.settings.unattended

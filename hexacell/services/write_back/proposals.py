@@ -110,15 +110,12 @@ def approval_question(proposal: Proposal) -> Question:
 
 
 async def apply_proposal(
-    proposal: Proposal, operator: Operator, *, typed_by: str = COMMAND, reason: str = ""
+    proposal: Proposal, operator: Operator | None, *, typed_by: str = COMMAND, reason: str = ""
 ) -> AppliedProposal:
     """Write a proposal into the controller's config, once a person has accepted what needs one.
 
-    Args:
-        proposal: of a run of the cell.
-        operator: who is asked where a gate needs a person.
-        typed_by: who approves where no gate needs a person.
-        reason: why, as the history of the config is to have it.
+    The ``operator`` is asked where a gate needs a person; without one ``typed_by`` has accepted it already.
+    ``reason`` is why, as the history of the config is to have it.
 
     Raises:
         UsageError: ``reason`` is no line of text.
@@ -158,11 +155,11 @@ def _approval_path(folder: RunFolder) -> Path:
     return folder.path / "applied.json"
 
 
-async def _approval(proposal: Proposal, operator: Operator, typed_by: str) -> str:
+async def _approval(proposal: Proposal, operator: Operator | None, typed_by: str) -> str:
     failed = [gate for gate in proposal.gates if not gate.passed]
     if refused := [gate.sentence for gate in failed if not gate.needs_person]:
         raise LimitError("the new geometry is refused: " + " ".join(refused))
-    if not failed:
+    if not failed or operator is None:
         return typed_by
     if (name := await operator.ask(approval_question(proposal))) is None:
         raise LimitError("the new geometry was declined; nothing was applied")

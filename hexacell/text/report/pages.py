@@ -98,13 +98,9 @@ class Report:
 def rendered(
     template: str, written: Callable[[Any], Any] | None = None, *, is_markup: bool = True, **values: object
 ) -> str:
-    """A template of this package with its values.
+    """A template of this package with its values, to each of which ``written`` is done before.
 
-    Args:
-        template: the name of its file.
-        written: what is done to each value before it is written.
-        is_markup: whether it is HTML or XML; then every text in it is escaped.
-        values: by the names that the template has for them.
+    ``is_markup`` is whether it is HTML or XML; then every text in it is escaped.
     """
     environment = Environment(
         loader=FileSystemLoader(TEMPLATES),

@@ -165,7 +165,6 @@ def _encoder_line(encoders: Shown[EncoderSample], later_s: float) -> Line:
 
 
 def _controller_line(controller: Shown[ControllerStatus], later_s: float) -> Line:
-    """Whether the controller may move."""
     text, urgency = controller.problem or "no answer yet", urgency_of(controller.problem)
     if not controller.problem and (status := controller.value) is not None:
         said = "".join(f"; {message}" for message in status.error_messages)

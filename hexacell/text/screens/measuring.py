@@ -174,12 +174,12 @@ def _residual(sample: events.RecordTaken, expected: Expectation | None) -> str:
 
 def accuracy_plot(picture: RunPicture, target_mm: float | None) -> PlotView:
     """The predicted error at the worst task pose against the records, and what is still expected."""
-    known = [(float(records), forecast.now_mm) for records, forecast in picture.forecasts]
-    series = [Series("so far", "o", *_columns(known))]
+    known = tuple((float(records), forecast.now_mm) for records, forecast in picture.forecasts)
+    series = [Series("so far", "o", known)]
     if picture.forecasts and picture.state.identified is None:
         records, last = picture.forecasts[-1]
-        coming = [(float(records + last.records), last.end_mm)] if last.records else []
-        series.append(Series("at the end", "x", *_columns(coming)))
+        coming = ((float(records + last.records), last.end_mm),) if last.records else ()
+        series.append(Series("at the end", "x", coming))
     title = "Accuracy, as predicted"
     if picture.forecasts:
         last = picture.forecasts[-1][1]
@@ -193,10 +193,6 @@ def accuracy_plot(picture: RunPicture, target_mm: float | None) -> PlotView:
         is_logarithmic=True,
         note="Predicted from the second point on, once the records determine something.",
     )
-
-
-def _columns(pairs: list[tuple[float, float]]) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    return tuple(x for x, _ in pairs), tuple(y for _, y in pairs)
 
 
 def fault_view(setback: Setback) -> FaultView:

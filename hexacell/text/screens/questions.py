@@ -6,7 +6,7 @@ from hexacell.run_process.messages import LiveSnapshot
 from hexacell.text.config_changes import pending_text
 from hexacell.text.screens.views import Choice, QuestionView, Urgency
 from hexacell.text.terms import found_sentence
-from hexacell.text.verdict import gate_lines, improvement_sentence, teaching_sentence
+from hexacell.text.verdict import improvement_sentence, teaching_sentence
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.run import questions
 
@@ -30,7 +30,8 @@ def question_view(
             return _placement(place, live)
         case questions.PendingChange(gates=gates, displacement=moved, improvement=improvement) as pending:
             gain = improvement_sentence(improvement)
-            facts = gate_lines(gates), found_sentence(pending.found), gain, teaching_sentence(moved)
+            lines = "\n".join(f"{'ok' if gate.passed else 'NO'}  {gate.sentence}" for gate in gates)
+            facts = lines, found_sentence(pending.found), gain, teaching_sentence(moved)
             title = "Write the new geometry into the controller's config?"
             view = _consenting(question, person, "write it", title)
             change, refusal = f"The change:\n{pending_text(pending)}", approval_refusal(gates)

@@ -6,7 +6,6 @@ from hexacell.cell.model import CellSettings
 from hexacell.text.config_changes import pending_text
 from hexacell.text.line_face import event_text
 from hexacell.text.parameters import parameter_table, rows_of_run
-from hexacell.text.screens.measuring import accuracy_plot
 from hexacell.text.screens.questions import PERSON, approval_refusal
 from hexacell.text.screens.run_picture import RunPicture
 from hexacell.text.screens.views import Choice, PlotView, QuestionView, Series, Urgency
@@ -52,11 +51,6 @@ def review_texts(
         "parameters": "\n".join(parameters) or "The geometry is not identified yet.",
         "change": change or "There is no change yet.",
     }
-
-
-def review_plots(picture: RunPicture) -> tuple[PlotView, ...]:
-    """Deviations of the held-out poses, residuals of the records, and the predicted accuracy."""
-    return deviation_plot(picture.state), residual_plot(picture), accuracy_plot(picture, None)
 
 
 def _scope(state: RunState) -> tuple[str, ...]:
@@ -108,9 +102,10 @@ def deviation_plot(state: RunState) -> PlotView:
     """The ball's distance from its reference at each held-out pose, as figures 8 and 9 of the paper."""
     series = []
     for name, marker, phase in (("before", "o", Phase.BEFORE), ("after", "x", Phase.AFTER)):
-        sizes = [float(np.linalg.norm(one)) for one in state.held_out(phase)]
-        numbers = tuple(float(number) for number in range(1, len(sizes) + 1))
-        series.append(Series(name, marker, numbers, tuple(max(size, 1e-4) for size in sizes)))
+        sizes = (max(float(np.linalg.norm(one)), 1e-4) for one in state.held_out(phase))
+        series.append(
+            Series(name, marker, tuple((float(n), size) for n, size in enumerate(sizes, start=1)))
+        )
     return PlotView(
         title="Deviation per held-out pose, mm",
         x_label="held-out pose",
@@ -130,11 +125,10 @@ def residual_plot(picture: RunPicture) -> PlotView:
         pairs = zip(sample.deviation_mm, expected.deviation_mm, expected.sigma_mm, strict=True)
         scaled = [(measured - predicted) / sigma for measured, predicted, sigma in pairs if sigma > 0.0]
         found.append((float(number), max(scaled, key=abs, default=0.0)))
-    numbers, residuals = tuple(one for one, _ in found), tuple(two for _, two in found)
     return PlotView(
         title="Residual per record, sigma",
         x_label="record",
-        series=(Series("largest of x, y, z", "o", numbers, residuals),),
+        series=(Series("largest of x, y, z", "o", tuple(found)),),
         level=0.0,
         note="No record beside a reference is taken yet.",
     )

@@ -27,8 +27,7 @@ class Series:
 
     name: str
     marker: str
-    xs: tuple[float, ...]
-    ys: tuple[float, ...]
+    points: tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,14 +51,14 @@ class PlotView:
     @property
     def legend(self) -> str:
         """What each marker is."""
-        named = [f"{one.marker} {one.name}" for one in self.series if one.xs]
+        named = [f"{one.marker} {one.name}" for one in self.series if one.points]
         line = [f"- {self.level_name}"] if self.level is not None and self.level_name else []
         return "   ".join([*named, *line])
 
     @property
     def is_empty(self) -> bool:
         """Whether there is no point to draw."""
-        return not any(one.xs for one in self.series)
+        return not any(one.points for one in self.series)
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,8 +169,6 @@ LABEL_COLUMNS = 6
 FEWEST_COLUMNS, FEWEST_ROWS = 16, 5
 """In less room a picture says nothing."""
 
-LEVEL = "-"
-
 
 @dataclass(frozen=True, slots=True)
 class _Scale:
@@ -195,14 +192,14 @@ def plot_lines(view: PlotView, columns: int, rows: int) -> list[str]:
     """A picture of ``rows`` lines and ``columns`` columns; empty where there is no room or no point."""
     if view.is_empty or columns < FEWEST_COLUMNS or rows < FEWEST_ROWS:
         return []
-    xs = [x for series in view.series for x in series.xs]
+    xs = [x for series in view.series for x, _ in series.points]
     across = _Scale(min(xs), max(xs) if max(xs) > min(xs) else min(xs) + 1.0, columns - LABEL_COLUMNS - 1)
     down = _down(view, rows - 2)
     cells = [[" "] * across.cells for _ in range(down.cells)]
     if view.level is not None:
-        cells[down.cell(view.level)] = [LEVEL] * across.cells
+        cells[down.cell(view.level)] = ["-"] * across.cells
     for series in view.series:
-        for x, y in zip(series.xs, series.ys, strict=True):
+        for x, y in series.points:
             cells[down.cell(y)][across.cell(x)] = series.marker
     labels = _labels(down)
     drawn = [f"{labels.get(row, ''):>{LABEL_COLUMNS}}|{''.join(cells[row])}" for row in range(down.cells)]
@@ -215,7 +212,7 @@ def plot_lines(view: PlotView, columns: int, rows: int) -> list[str]:
 
 def _down(view: PlotView, cells: int) -> _Scale:
     """From one round number to another, so that both ends have a label."""
-    ys = [y for series in view.series for y in series.ys if isfinite(y)]
+    ys = [y for series in view.series for _, y in series.points if isfinite(y)]
     ys += [] if view.level is None else [view.level]
     low, high = min(ys), max(ys)
     if view.is_logarithmic:
@@ -240,7 +237,6 @@ def _step(span: float, cells: int) -> float:
 
 
 def _labels(scale: _Scale) -> dict[int, str]:
-    """Numbers beside some of the cells."""
     if not scale.is_logarithmic:
         step = _step(scale.high - scale.low, scale.cells)
         count = round((scale.high - scale.low) / step)

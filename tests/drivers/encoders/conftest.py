@@ -14,7 +14,7 @@ from drivers.encoders.cia406 import Cia406Bank
 from hexacell.cell.devices import LinearEncoderSettings
 from tests.waiting import until
 
-SYNC, NMT, EMERGENCY, SDO_ANSWER, SDO_REQUEST, HEARTBEAT = 0x80, 0x00, 0x80, 0x580, 0x600, 0x700
+SYNC, NMT, SDO_ANSWER, SDO_REQUEST, HEARTBEAT = 0x80, 0x00, 0x580, 0x600, 0x700
 NOT_THERE = 0x0602_0000
 Object = tuple[int, int]
 

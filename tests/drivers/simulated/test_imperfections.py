@@ -202,6 +202,18 @@ def test_a_machine_that_grows_evenly_is_the_same_machine_in_large(name: str) -> 
         assert warm.rotations == pytest.approx(pose.rotations, abs=1e-9)
 
 
+def test_legs_grow_by_their_shares_of_the_rise() -> None:
+    shares = (1.0, 2.0, 0.5, 0.0, 1.5, 3.0)
+    alone = {"temperature.expansion_base_um_m_k": 0.0, "temperature.expansion_platform_um_m_k": 0.0}
+    machine = Machine("simulated-hexaglide", **alone, **{"temperature.legs_share": shares})
+    warm, pose = machine.loaded(1, warmer_k=10.0), machine.poses[[1]]
+    vector = machine.geometry.vector.copy()
+    vector[machine.geometry.parameters.slices["l"]] *= 1.0 + 10.0 * 11.5e-6 * np.array(shares)
+    grown = Geometry(machine.geometry.parameters, vector)
+    expected = forward_kinematics(machine.mechanism, grown, machine.joints[[1]], pose).poses
+    assert warm.positions == pytest.approx(expected.positions, abs=1e-8)
+
+
 def test_a_cell_becomes_warmer_evenly_from_its_start_and_then_stays_so() -> None:
     rising = {"temperature.rise_k": 4.0, "temperature.over_s": 1000.0, "station_reach_mm": 1e6}
     machine = Machine("linapod", **STILL | rising)

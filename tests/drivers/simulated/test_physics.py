@@ -20,7 +20,6 @@ POSES = [
     Pose(-12.0, 8.0, 560.0, -10.0, 3.0, -5.0),
     Pose(0.0, 0.0, 550.0),
 ]
-FAR = Pose(100.0, 100.0, 550.0)
 
 
 def go(twin: Any, pose: Pose) -> None:

@@ -8,7 +8,6 @@ import pytest
 from hexacell.campaign.decisions import Finished
 from hexacell.checks.change_alarm import FIRST_RECORDS, change_alarm
 from hexacell.checks.check import Check
-from hexacell.checks.check_result import check_result
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet
@@ -86,14 +85,13 @@ def test_the_expansion_of_the_legs_raises_no_alarm(check) -> None:
     parameters = check.robot.mechanism.parameters
     length = check.robot.commanding.vector[parameters.names.index(f"l{leg}")]
     longer = 1e-6 * check.settings.uncertainty.expansion_legs_um_m_k * length * kelvin
-    records = measured(check, f"l{leg}", longer)
-    warmer = np.zeros((len(records), 6))
-    naive = check_result(check, records, None, (), warmer)
-    warmer[:, leg - 1] = kelvin
-    known = check_result(check, records, None, (), warmer)
-    assert naive.alarm is not None
-    assert known.alarm is not None
-    assert naive.alarm.is_raised
-    assert not known.alarm.is_raised
-    unknown = check_result(check, records, None, (), np.full((len(records), 6), np.nan))
-    assert unknown.alarm is None
+    records = measured(check, f"l{leg}", longer).records
+    now = [20.0 + kelvin * (number == leg) for number in range(1, 7)]
+    shown = MeasurementSet(tuple(replace(one, temperatures=(*now, None)) for one in records))
+    naive, unknown = (change_alarm(check, one) for one in (MeasurementSet(records), shown))
+    known = change_alarm(check, shown, (20.0,) * 6)
+    assert naive is not None
+    assert known is not None
+    assert naive.is_raised
+    assert not known.is_raised
+    assert unknown is None

@@ -209,10 +209,6 @@ def _file_errors(several: SeveralErrors) -> list[FileError]:
     return [error for error in several.errors if isinstance(error, FileError)]
 
 
-PIECES = [b"[", b"]", b"{", b"}", b'"', b"'", b"=", b",", b".", b"\n", b"#", b"\\", b"nan"]
-PIECES += [b"-1", b"true", b"[[a]]\n", b'"""', b"1e999"]
-
-
 @given(data=st.data())
 def test_values_of_any_kind_in_any_place_give_plain_errors_only(cell_text, load_text, data):
     lines = cell_text.splitlines()

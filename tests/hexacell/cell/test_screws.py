@@ -1,7 +1,5 @@
 """Section ``[robot.screws]``: legs that are screws."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -12,7 +10,6 @@ from hexacell.kinematics.mechanisms.gough_stewart import ScrewLegs
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.robot.model import robot_of
 
-CONFIGS = Path(__file__).parents[3] / "configs"
 SCREWS = f"""
 [robot.screws]
 lead_mm = 5.0

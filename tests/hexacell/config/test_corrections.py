@@ -308,7 +308,7 @@ def test_a_plug_in_that_knows_of_no_corrections_holds_none(config: Path) -> None
     class PlugIn(NativeToml):
         holds = frozenset()
 
-    layout = ConfigLayout(NATIVE.parameters, (FormatOfFile("plug-in", PlugIn(NATIVE.parameters)),))
+    layout = ConfigLayout(NATIVE.parameters, (FormatOfFile("plug-in", PlugIn(NATIVE.parameters, {})),))
     found = layout.read(config)
     assert layout.holds == found.holds == frozenset()
     assert found.corrections == NO_CORRECTIONS

@@ -174,16 +174,6 @@ def test_a_length_that_is_not_above_zero_is_refused_with_its_line(kind, written)
     assert "-2.0" in body[(caught.value.line or 0) - 1]
 
 
-@BY_NAME
-@pytest.mark.parametrize("value", [np.nan, np.inf, -3.0])
-def test_an_unphysical_geometry_is_not_written(kind, value) -> None:
-    body = "\n".join(kind.write(lambda _: "1.5", " "))
-    vector = np.full(42, 1.5)
-    vector[41] = value
-    with pytest.raises(FileError, match="Nothing was written"):
-        kind.form.rewrite([body], Geometry(HEXAGLIDE_PARAMETERS, vector))
-
-
 def test_an_inch_machine_keeps_a_nanometre(written) -> None:
     form = one_file(HalPins(HEXAGLIDE_PARAMETERS, HAL | {"unit_mm": 25.4}))
     text = "\n".join(write_hal(lambda _: "20.5", " "))

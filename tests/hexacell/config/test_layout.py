@@ -1,6 +1,7 @@
 """A geometry in several files: each parameter in one of them, whichever."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ HAL, INI, LINES, TOML = "linuxcnc-hal", "linuxcnc-ini", "template", "toml"
 
 
 def part(name: str, **options):
-    kinds = {HAL: HalPins, INI: LinuxcncIni, LINES: LineTemplates, TOML: NativeToml}
+    kinds: dict[str, Any] = {HAL: HalPins, INI: LinuxcncIni, LINES: LineTemplates, TOML: NativeToml}
     return FormatOfFile(name, kinds[name](HEXAGLIDE_PARAMETERS, options, is_part=True))
 
 
@@ -112,13 +113,13 @@ def test_a_pin_set_to_a_variable_of_the_ini_file_is_in_that_file_alone(tmp_path)
     assert LAYOUT.read(hal, ini).geometry.vector == pytest.approx(drawn_geometry().vector, abs=0.0)
 
 
-@pytest.mark.parametrize("value", [np.nan, -1.0e9])
-def test_an_unphysical_geometry_is_written_into_none(value) -> None:
+@pytest.mark.parametrize(("place", "value"), [(0, np.nan), (20, np.inf), (41, 0.0), (36, -700.0)])
+def test_an_unphysical_geometry_is_written_into_none(place, value) -> None:
     text = "\n".join(["[GEOMETRY]", *map(ini_row, NAMES)])
     vector = np.full(42, 1.5)
-    vector[41] = value
+    vector[place] = value
     layout = ConfigLayout(HEXAGLIDE_PARAMETERS, (part(INI, branch=SIGNS), part(HAL)))
-    with pytest.raises(FileError, match="Nothing was written"):
+    with pytest.raises(FileError, match=r"the new geometry has values.*Nothing was written"):
         layout.rewrite((text, ""), Geometry(HEXAGLIDE_PARAMETERS, vector))
 
 

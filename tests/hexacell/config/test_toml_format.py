@@ -235,16 +235,6 @@ def test_absent_and_unreadable(tmp_path: Path) -> None:
         FORMAT.read(tmp_path)
 
 
-@pytest.mark.parametrize(("place", "value"), [(0, np.nan), (20, np.inf), (41, 0.0), (36, -700.0)])
-def test_no_geometry_is_written_that_could_not_be_read(
-    geometry: Geometry, place: int, value: float
-) -> None:
-    vector = geometry.vector.copy()
-    vector[place] = value
-    with pytest.raises(FileError, match="the new geometry has values"):
-        FORMAT.rewrite([GOOD], Geometry(HEXAGLIDE_PARAMETERS, vector))
-
-
 def test_a_leg_too_short_for_six_decimals_is_refused(geometry: Geometry) -> None:
     vector = geometry.vector.copy()
     vector[36] = 1e-9

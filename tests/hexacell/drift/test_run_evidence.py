@@ -9,11 +9,14 @@ from hexacell.drift.drift_watch import QUIET_RUNS, alarm_limit, sums_after, two_
 from hexacell.drift.run_evidence import CarriedPosterior, whiten_records
 from hexacell.drift.single_cause import single_cause_test
 from hexacell.identification.problem.prior import SystematicErrors
+from hexacell.identification.thermal_expansion import ThermalExpansion
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import free_parameter_derivatives
 from hexacell.kinematics.rotations import Array
+from hexacell.measurements.records import MeasurementSet
 
-EXPANSION_MM = 0.05 * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+UM_M_K = 23.0
+WARMER_K = 4.0 * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 
 
 def constant_along_x(measured) -> SystematicErrors:
@@ -50,18 +53,19 @@ def test_errors_of_one_run_count_as_noise_and_shared_ones_as_state(identified) -
 
 
 def test_legs_that_were_longer_by_heat_are_taken_out(visit, make_problem, hexaglide, paper) -> None:
-    """The same records of a machine with longer legs: without their lengths it seems to have changed."""
+    """The same records of a machine with longer legs: without temperatures it seems to have changed."""
     actual = hexaglide.normalize_frames(paper.actual)[0]
-    rows = actual.parameters.slices["l"]
     longer = actual.vector.copy()
-    longer[rows] += EXPANSION_MM
+    longer[actual.parameters.slices["l"]] *= 1.0 + 1e-6 * UM_M_K * WARMER_K
     warm = visit(Geometry(actual.parameters, longer), seed=4).measured(0.01, seed=3)
-    problem, free = make_problem(warm), hexaglide.convention.free_parameters(actual)
-    expansion = np.zeros((problem.records, len(longer)))
-    expansion[:, rows] = EXPANSION_MM
+    shown = MeasurementSet(
+        tuple(replace(one, temperatures=(*WARMER_K.tolist(), None)) for one in warm.records)
+    )
+    free = hexaglide.convention.free_parameters(actual)
     causes, known = free_parameter_derivatives(hexaglide, actual), 1e-6 * np.eye(len(free))
-    seen = single_cause_test(whiten_records(problem, free), known, causes)
-    corrected = single_cause_test(whiten_records(problem, free, expansion=expansion), known, causes)
+    seen = single_cause_test(whiten_records(make_problem(warm), free), known, causes)
+    problem = make_problem(shown, expansion=ThermalExpansion(UM_M_K, 0.0, (0.0,) * 7))
+    corrected = single_cause_test(whiten_records(problem, free), known, causes)
     assert np.abs(seen.scores).max() > seen.limit
     assert np.abs(corrected.scores).max() < corrected.limit
 

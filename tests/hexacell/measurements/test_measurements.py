@@ -29,6 +29,7 @@ records = st.builds(
     joints=st.tuples(*[finite] * 6),
     deviation=st.tuples(finite, finite, finite),
     directions=st.just(()) | st.tuples(*[st.sampled_from([1, -1, 0])] * 6),
+    temperatures=st.just(()) | st.tuples(*[st.none() | finite] * 7).filter(any),
 )
 measurement_sets = st.lists(records, max_size=8, unique_by=lambda r: (r.point, r.orientation)).map(
     lambda rows: MeasurementSet(tuple(rows))
@@ -67,6 +68,17 @@ def test_directions_are_read_where_the_file_has_them(read):
     lines = [f"{HEADER},d1,d2,d3,d4,d5,d6", *(f"{row},{six}" for row, six in zip(ROWS, rows, strict=True))]
     found = [record.directions for record in read("\n".join(lines)).records]
     assert found == [(1, -1, 0, 0, 1, 1), (), (0,) * 6, (1,) * 6]
+
+
+def test_temperatures_are_read_of_the_parts_that_the_file_has(read):
+    cells = ["21.5,,20", ",,", "20,0,-3.25", "1,1,1"]
+    lines = [f"{HEADER},tb,t1,t6", *(f"{row},{three}" for row, three in zip(ROWS, cells, strict=True))]
+    found = read("\n".join(lines))
+    assert found.records[0].temperatures == (None, None, None, None, None, 20.0, 21.5)
+    assert found.records[1].temperatures == ()
+    np.testing.assert_array_equal(found.temperatures[:, 0], [np.nan, np.nan, 0.0, 1.0])
+    with pytest.raises(FileError, match='t6 is "warm", but must be a finite number'):
+        read("\n".join(lines).replace("-3.25", "warm"))
 
 
 def test_header_is_the_documented_one(csv_path):

@@ -11,8 +11,8 @@ from hexacell.results.result import IdentificationResult
 
 # docs/interface.md, the document of fit --json; termination is an addition.
 KEYS = (
-    "chi2 converged covariance dof expected_chi2 frame geometry identifies iterations noise_freedom "
-    "outliers parameters points records residual_rms_mm sigma termination terms undetermined"
+    "chi2 converged covariance dof expected_chi2 frame geometry holds_at_c identifies iterations "
+    "noise_freedom outliers parameters points records residual_rms_mm sigma termination terms undetermined"
 )
 
 

@@ -81,7 +81,7 @@ class Connected:
 class ScriptedRun(Connected):
     """An audience without an engine, and what it was asked for."""
 
-    def __init__(self, path: Path, stuck_s: float) -> None:
+    def __init__(self, path: Path) -> None:
         super().__init__(path)
         self.calls: asyncio.Queue[Any] = asyncio.Queue()
         note = self.calls.put_nowait
@@ -90,7 +90,6 @@ class ScriptedRun(Connected):
             on_command=note,
             on_control=lambda: note("control"),
             on_leave=lambda leave: note("lost" if leave is None else ("left", leave.keep_running)),
-            stuck_s=stuck_s,
         )
 
 
@@ -98,11 +97,12 @@ MakeRun = Callable[..., AbstractAsyncContextManager[ScriptedRun]]
 
 
 @pytest.fixture
-def scripted_run(path: Path) -> MakeRun:
+def scripted_run(path: Path, monkeypatch: pytest.MonkeyPatch) -> MakeRun:
     @asynccontextmanager
     async def run(stuck_s: float = 3600.0) -> AsyncIterator[ScriptedRun]:
+        monkeypatch.setattr("hexacell.run_process.audience.STUCK_S", stuck_s)
         with listening_socket(path) as listener:
-            scripted = ScriptedRun(path, stuck_s)
+            scripted = ScriptedRun(path)
             server = await audience_server(scripted.audience, listener)
             yield scripted
             scripted.close()

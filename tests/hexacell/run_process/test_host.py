@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -47,11 +48,11 @@ def cell(tmp_path: Path) -> Cell:
 class HostedRun(Connected):
     """A host in this process, and its clients."""
 
-    def __init__(self, cell: Cell, path: Path, away_s: float | None, resume: bool) -> None:
+    def __init__(self, cell: Cell, path: Path, resume: bool) -> None:
         super().__init__(path)
         self.folder = RunFolder(runs_folder(cell) / "run")
         request = RunRequest(cell, self.folder, Mode.OPTIMISE, RemoteOperator(), resume=resume)
-        self.host = RunHost(request, CommandQueue(), away_s=away_s)
+        self.host = RunHost(request, CommandQueue())
         self.serving: asyncio.Future[ExitCode] = asyncio.get_running_loop().create_future()
 
     @property
@@ -65,8 +66,10 @@ Hosted = Callable[..., AbstractAsyncContextManager[HostedRun]]
 @pytest.fixture
 def hosted(path: Path, cell: Cell) -> Hosted:
     @asynccontextmanager
-    async def run(away_s: float | None = None, *, resume: bool = False) -> AsyncIterator[HostedRun]:
-        hosted = HostedRun(cell, path, away_s, resume)
+    async def run(away_minutes: float = 30.0, *, resume: bool = False) -> AsyncIterator[HostedRun]:
+        away = cell.settings.recovery.model_copy(update={"away_minutes": away_minutes})
+        settings = cell.settings.model_copy(update={"recovery": away})
+        hosted = HostedRun(replace(cell, settings=settings), path, resume)
         with listening_socket(path) as listener:
             hosted.serving = asyncio.ensure_future(hosted.host.serve(listener))
             try:
@@ -187,14 +190,14 @@ async def test_who_leaves_it_running_finds_it_running(hosted) -> None:
 
 
 async def test_where_nobody_comes_back_it_ends_and_is_resumed(hosted) -> None:
-    async with hosted(away_s=0.0) as run:
+    async with hosted(away_minutes=1e-6) as run:
         lost = await run.client()
         await place(lost)
         await lost.until(told_of(events.RecordTaken))
         lost.hang_up()
         assert await run.serving is ExitCode.INTERRUPTED
     before = run.history
-    assert before[-1] == events.Interrupted(reason="nobody was connected for 0 minutes", exit_code=130)
+    assert before[-1] == events.Interrupted(reason="nobody was connected for 1e-06 minutes", exit_code=130)
     assert any(isinstance(event, events.Paused) for event in before)
     async with hosted(resume=True) as resumed:
         client = await resumed.client()

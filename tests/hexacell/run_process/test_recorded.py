@@ -182,12 +182,9 @@ async def test_nobody_commands_the_past(tmp_path) -> None:
         await run.take_control()
 
 
-def test_no_speed_and_a_folder_without_a_run_are_refused(tmp_path) -> None:
+def test_a_folder_without_a_run_is_refused(tmp_path) -> None:
     with pytest.raises(FileError, match="cannot be read"):
         RecordedRun(RunFolder(tmp_path))
     (tmp_path / "journal.jsonl").touch()
     with pytest.raises(FileError, match="the journal is empty"):
         RecordedRun(RunFolder(tmp_path))
-    for speed in (-1.0, float("inf"), float("nan")):
-        with pytest.raises(UsageError, match="is not a speed"):
-            RecordedRun(recorded(tmp_path)).set_speed(speed)

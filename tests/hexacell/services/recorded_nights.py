@@ -22,7 +22,7 @@ from hexacell.verdict.decision import Verdict
 from procedures.calibration.calibration import Calibration, Mode
 from procedures.journal.journal import Entry, encode
 from procedures.run.keys import Phase, SetKey
-from procedures.run.readings import Reading, Temperature
+from procedures.run.readings import Reading, Temperature, on_parts
 from procedures.steps import events
 
 FIRST_NIGHT = datetime(2026, 3, 1, 2, 30, tzinfo=UTC)
@@ -106,6 +106,7 @@ class Nights:
 
     def taken(self, record: Record) -> events.RecordTaken:
         pose = record.pose.as_tuple()
+        temperatures = tuple(Temperature(name=n, celsius=c) for n, c in self.celsius.items())
         reading = Reading(
             gauges_mm=record.deviation,
             spread_mm=(0.0, 0.0, 0.0),
@@ -113,7 +114,8 @@ class Nights:
             answers=(),
             counts=((0,) * 6,),
             skews_s=(),
-            temperatures=tuple(Temperature(name=n, celsius=c) for n, c in self.celsius.items()),
+            temperatures=temperatures,
+            part_temperatures=on_parts(self.cell.settings.thermometers, temperatures),
         )
         return events.RecordTaken(
             at=SetKey(phase=Phase.IDENTIFY, point=record.point),

@@ -46,7 +46,7 @@ def test_an_unchanged_robot_raises_no_alarm(nights) -> None:
 def test_a_crash_is_told_with_its_leg_size_and_time(nights) -> None:
     found = after(nights, 8, 2, crash=CRASH)
     (change,) = found.changes
-    assert (change.leg, change.other_legs) == (4, ())
+    assert (change.possible_legs[0], change.other_legs) == (4, ())
     assert (change.after.day, change.before.day, change.noticed.day) == (9, 10, 10)
     assert abs(abs(change.change) - 0.31) < 4 * change.sigma + 0.05
     sentence = change_sentence(change)
@@ -146,7 +146,7 @@ def test_the_expansion_of_legs_with_thermometers_is_no_drift_and_hides_none(nigh
     nights.changes["l4"] += 0.31
     nights.check()
     (change,) = drift_history(nights.cell).changes
-    assert (change.leg, change.other_legs) == (4, ())
+    assert (change.possible_legs[0], change.other_legs) == (4, ())
 
 
 def test_what_moves_on_steadily_is_of_its_leg(nights) -> None:

@@ -23,7 +23,7 @@ def outcome(trial: DesignTrial) -> DesignOutcome:
     accuracies = tuple(
         RecordsAccuracy(11 * points, error, 0.1 * error, 0.01 * error) for points in (2, 3, 4, 5)
     )
-    return DesignOutcome(accuracies, 4.0, 0)
+    return DesignOutcome(accuracies, 4.0)
 
 
 def study(robots: int):

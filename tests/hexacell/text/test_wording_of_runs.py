@@ -12,7 +12,7 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.cli.arguments import make_parser
-from hexacell.cli.commands.run import closing_lines, resume_command, resume_hint, run_document
+from hexacell.cli.commands.run import closing_lines, resume_command, run_document
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.run_process.messages import GaugeSnapshot, LiveSnapshot, Shown
 from hexacell.runs.run_folder import RunFolder
@@ -178,7 +178,6 @@ def test_the_resume_command_parses_to_the_same_request(request_of, mode):
     assert options.target == ("run.length" if mode is Mode.LENGTH else "run.main")
     named = mode.value if mode in {Mode.CHECK, Mode.QUICK} else None
     assert getattr(options, "mode", None) == named
-    assert resume_hint(request).splitlines()[1].strip() == resume_command(request)
 
 
 def test_one_line_before_the_result_says_what_must_be_taught_anew(request_of):

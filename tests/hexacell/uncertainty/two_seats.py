@@ -67,6 +67,7 @@ class TwoSeats:
             deviations,
             np.eye(3),
             np.zeros_like(joints),
+            np.zeros_like(joints),
         )
         return LengthRecords.of(commanded, mountings)
 

@@ -2,7 +2,6 @@
 
 from typing import Any, get_args
 
-import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -12,13 +11,7 @@ from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.cell.devices import ThermometerSettings
 from procedures.journal.journal import Journal, read_journal
 from procedures.run.keys import Phase, SetKey
-from procedures.run.readings import (
-    Reading,
-    Temperature,
-    legs_warmer,
-    mean_leg_temperatures,
-    mean_temperature,
-)
+from procedures.run.readings import Reading, Temperature, mean_leg_temperatures, mean_temperature, on_parts
 from procedures.run.state import RunState, apply, fold
 from procedures.steps import events
 from procedures.steps.close import CloseSet
@@ -112,8 +105,10 @@ def test_the_range_of_temperatures_is_that_of_one_thermometer(story) -> None:
         warm(story().sampled(2), room=19.5, rails=None),
         warm(story().sampled(3), room=19.25, rails=24.125),
     ]
-    assert fold(told).temperature_range_k == 0.5
-    assert fold([story().sampled()]).temperature_range_k is None
+    assert fold(told).temperature_range_k() == 0.5
+    assert fold(told).temperature_range_k(["room"]) == 0.125
+    assert fold(told).temperature_range_k(["room", "rails"]) == 0.5
+    assert fold([story().sampled()]).temperature_range_k() is None
 
 
 def test_held_out_deviations_leave_references_out(story) -> None:
@@ -187,7 +182,6 @@ ROOM = ThermometerSettings(name="room", path="/room")
 PAIR = ThermometerSettings(name="pair", path="/pair", legs=(1, 2))
 SIXTH = ThermometerSettings(name="sixth", path="/sixth", legs=(6,))
 ALL = (ROOM, PAIR, SIXTH)
-BEFORE = (20.0, 21.0, None, None, None, 19.0)
 
 
 def sample(**celsius: float | None) -> Reading:
@@ -198,16 +192,12 @@ def sample(**celsius: float | None) -> Reading:
 SHOWN = (sample(room=5.0, pair=22.0, sixth=20.0), sample(room=5.0, pair=24.0, sixth=None))
 
 
-def test_each_leg_is_compared_with_its_own_temperature_of_before() -> None:
-    expected = [[2.0, 1.0, 0.0, 0.0, 0.0, 1.0], [4.0, 3.0, 0.0, 0.0, 0.0, 1.0]]
-    np.testing.assert_array_equal(legs_warmer(ALL, SHOWN, BEFORE), expected)
-
-
-def test_what_is_not_known_is_not_taken_for_nothing() -> None:
-    silent = [sample(room=5.0, pair=22.0, sixth=None)]
-    assert np.isnan(legs_warmer(ALL, silent, BEFORE)[:, 5]).all()
-    assert np.isnan(legs_warmer(ALL, SHOWN, ())[:, [0, 1, 5]]).all()
-    assert not legs_warmer((ROOM,), SHOWN, ()).any()
+def test_parts_have_the_temperatures_of_the_thermometers_on_them() -> None:
+    base = ThermometerSettings(name="room", path="/room", part="base")
+    shown = [reading.temperatures for reading in SHOWN]
+    assert on_parts((base, PAIR, SIXTH), shown[0]) == (22.0, 22.0, None, None, None, 20.0, 5.0)
+    assert on_parts(ALL, shown[1]) == (24.0, 24.0, None, None, None, None, None)
+    assert on_parts((SIXTH,), shown[1]) == ()
 
 
 def test_means_are_of_legs_that_have_a_thermometer() -> None:

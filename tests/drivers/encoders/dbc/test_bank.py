@@ -49,31 +49,6 @@ async def test_the_request_is_on_the_wire(settings, wire):
     await bank.close()
 
 
-@pytest.mark.parametrize(
-    ("fault", "error", "message"),
-    [
-        ("silent", SilentNodeError, r"encoder of leg 3 \(ENC3.Position\): sends nothing for 0\.4 s"),
-        ("alarm", InvalidSampleError, r"leg 3 \(ENC3.Position\): sends Error 1, not 0; its position"),
-        ("jumped", InvalidSampleError, "jumped from 30.000 to 430.000 mm"),
-    ],
-)
-async def test_a_fault_names_the_leg(simulated, fault, error, message):
-    cell = simulated(must_be={"Error": 0})
-    await cell.driver.open()
-    await cell.driver.read()
-    cell.bank.faults(3)[fault](on=True)
-    with pytest.raises(error, match=message):
-        await _read_often(cell.driver)
-    cell.bank.faults(3)[fault](on=False)
-    await cell.driver.open()
-    await cell.driver.read()
-
-
-async def _read_often(bank: DbcBank) -> None:
-    for _ in range(5):
-        await bank.read()
-
-
 async def test_one_that_is_silent_from_the_start_is_named(settings, wire):
     bank = DbcBank(settings(wire.settings))
     with pytest.raises(SilentNodeError, match="leg 5"):

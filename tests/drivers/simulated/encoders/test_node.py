@@ -5,7 +5,7 @@ import pytest
 from hexacell.clock import CellClock
 
 START, STOP, PRE_OPERATIONAL, RESET, RESET_COMMUNICATION = 1, 2, 0x80, 0x81, 0x82
-SYNC, NMT, ALL = 0x80, 0, 0
+SYNC, NMT = 0x80, 0
 
 
 @pytest.mark.parametrize("command", [STOP, PRE_OPERATIONAL, RESET, RESET_COMMUNICATION])

@@ -26,15 +26,6 @@ async def ready(driver):
     await made.close()
 
 
-async def begin(ready, machine):
-    """A long move that has started."""
-    machine.duration_s = LONG_S
-    machine.events.clear()
-    moving = asyncio.create_task(ready.move(TARGET, MOVE_S))
-    await asyncio.to_thread(machine.wait_for, "move")
-    return moving
-
-
 async def test_a_stop_that_overtakes_its_move(ready, machine):
     """The abort may overtake the move that it is meant for."""
     machine.duration_s = LONG_S

@@ -47,20 +47,9 @@ def test_a_move_lasts_as_its_feed_or_inverse_time_says(block, duration_s):
     assert parse_block(block, HERE).duration_s == duration_s
 
 
-def test_a_rotated_coordinate_system_turns_every_move_but_one_in_machine_coordinates():
-    rotated = ModalState(rotation_deg=90.0)
-    there = Pose(100.0, 0.0, 550.0, 0.0, 0.0, 0.0)
-    words = "X100 Y0 Z550 A0 B0 C0"
-    turned = parse_block(f"G0 {words}", HERE, rotated).target
-    assert turned is not None
-    assert turned.as_tuple() == pytest.approx((0.0, 100.0, 550.0, 0.0, 0.0, 0.0))
-    assert parse_block(f"G53 G0 {words}", HERE, rotated).target == there
-    assert parse_block("G94", HERE, rotated).modes.rotation_deg == 90.0
-
-
 def test_offsets_move_every_target_but_one_in_machine_coordinates():
     here = Pose(100.0, 0.0, 550.0, 0.0, 0.0, 0.0)
-    shifted = ModalState(work_offset=(4.0, 0.0, 0.0, 0.0, 0.0, 5.0), offset=(6.0,) + (0.0,) * 5)
+    shifted = ModalState(offset=(10.0, 0.0, 0.0, 0.0, 0.0, 5.0))
     moved = parse_block("G0 X20 C1", here, shifted).target
     assert moved == Pose(30.0, 0.0, 550.0, 0.0, 0.0, 6.0)
     assert parse_block("G53 G0 X20 C1", here, shifted).target == Pose(20.0, 0.0, 550.0, 0.0, 0.0, 1.0)

@@ -34,7 +34,8 @@ def placement(request) -> RecordPlacement:
     joints = robot.mechanism.inverse(geometry, robot.branch, poses)
     directions = np.random.default_rng(2).choice([-1.0, 1.0], joints.shape)
     zeros = np.zeros((len(joints), 3))
-    return RecordPlacement(robot.mechanism, geometry, poses, joints, zeros, np.eye(3), directions)
+    readings = joints, zeros, np.eye(3), directions, np.zeros_like(joints)
+    return RecordPlacement(robot.mechanism, geometry, poses, *readings)
 
 
 def moved_mm(placement: Placement, geometry: Geometry, joints: np.ndarray) -> np.ndarray:

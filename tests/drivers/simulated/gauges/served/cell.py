@@ -45,7 +45,6 @@ def described(protocol, number):
 STREAM_DELAY_S = 0.02
 TRANSPORTS = ("pty", "socket")
 FAST = 100.0
-TIMEOUT_S = 1.0  # for what does not answer; a busy machine answers late
 WORST_LATENCY_S = 0.6
 LONG_S = 100.0
 

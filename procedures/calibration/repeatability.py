@@ -24,7 +24,8 @@ from hexacell.noise.reversal import Reversal, Revisit, reversal_of
 from hexacell.noise.standstill import display_step
 from procedures.run.keys import Phase
 from procedures.run.readings import Reading
-from procedures.run.state import RunState, SetState
+from procedures.run.set_state import SetState
+from procedures.run.state import RunState
 
 BACKLASH = str(CorrectionKind.BACKLASH)
 

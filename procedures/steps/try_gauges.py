@@ -14,7 +14,8 @@ from hexacell.noise.allowances import Allowances
 from hexacell.noise.gauge_trial import GaugeMistake, GaugeTrial, TrialFinding
 from procedures.resources.run_resources import RunResources
 from procedures.run.keys import ThreeNumbers
-from procedures.run.state import RunState, SetState
+from procedures.run.set_state import SetState
+from procedures.run.state import RunState
 from procedures.steps.base import EventOfSet, StepOfSet
 from procedures.steps.place import MountingError
 

@@ -12,7 +12,7 @@ from hexacell.kinematics.pose import Pose
 from hexacell.noise.allowances import SIGMAS, Allowances
 from procedures.calibration.repeatability import since_zero
 from procedures.run.readings import Reading
-from procedures.run.state import SetState
+from procedures.run.set_state import SetState
 from tests.benchmarks.worlds.campaigns import setting
 from tests.benchmarks.worlds.not_geometry import effect_of, terms_of
 from tests.benchmarks.worlds.world import World

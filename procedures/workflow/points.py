@@ -88,13 +88,17 @@ class NoiseSteps:
             return pilot
         reference = reference_pose(state, key)
         drawn = self.sets.robot.belief().zeroed_at(state.zero_shown(key))
-        belief, ball = (drawn, None) if known is None else (known[0], known[1].reference)
+        # What records of a robot that scatters seem to show may leave no way clear that is one as drawn.
+        beliefs = [] if known is None else [(known[0], known[1].reference)]
         distance = DISTANCE_SHARE * self.sets.robot.limits.room.smallest_mm
         # On all sides of the reference, each pose followed by the opposite one.
         sides = distance * np.concatenate([[row, -row] for row in np.eye(3)])
         poses = [beside(reference, (x, y, z)) for x, y, z in sides.tolist()]
-        clear = [pose for pose in poses if self.sets.is_clear_both_ways(belief, reference, pose, ball)]
-        return Move(at=key, orientation=0, pose=clear[done % len(clear)]) if clear else None
+        for belief, ball in (*beliefs, (drawn, None)):
+            clear = [pose for pose in poses if self.sets.is_clear_both_ways(belief, reference, pose, ball)]
+            if clear:
+                return Move(at=key, orientation=0, pose=clear[done % len(clear)])
+        return None
 
 
 @dataclass(frozen=True, eq=False)

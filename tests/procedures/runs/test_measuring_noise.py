@@ -24,6 +24,7 @@ from procedures.steps.move import Move
 from procedures.steps.pilot import Pilot
 from procedures.steps.repeat import Repeat
 from procedures.steps.standstill import Standstill
+from procedures.workflow.sets import SetSteps
 from tests.procedures.rig import MakeRig, Rig, new_rig
 from tests.procedures.runs.listening import PowerCut, happened, on, run_until, steps_of
 from tests.small_cell import choose_among_few
@@ -73,6 +74,18 @@ async def test_it_is_read_at_rest_left_in_all_directions_and_evaluated(asked, we
     assert moved[:2, :3] == pytest.approx(expected)
     assert np.linalg.norm(moved, axis=1) == pytest.approx(np.full(6, 1.5))
     assert np.linalg.matrix_rank(moved) == 3
+
+
+async def test_it_is_measured_whatever_records_seem_to_show(asked, well_known, monkeypatch):
+    as_drawn = SetSteps.is_clear_both_ways
+
+    def none_as_shown(self: SetSteps, belief: Any, here: Any, there: Any, ball: Any) -> bool:
+        return ball is None and as_drawn(self, belief, here, there, ball)
+
+    monkeypatch.setattr(SetSteps, "is_clear_both_ways", none_as_shown)
+    approaches = (await measure_noise(asked)).noise.approaches
+    assert approaches is not None
+    assert approaches.visits == 7
 
 
 @pytest.fixture(scope="module")

@@ -38,9 +38,6 @@ def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
 
 
-# Commands
-
-
 def commands(_page: str = "") -> str:
     """Every command with its arguments, as its ``--help`` has them."""
     return "\n".join(_command_sections(make_parser()))
@@ -75,9 +72,6 @@ def _argument_row(action: argparse.Action) -> tuple[str, str]:
     name = " ".join(filter(None, [*action.option_strings[:1], words]))
     text = (action.help or "") % {"default": action.default}
     return f"`{name}`".replace("|", r"\|"), escaped(text)
-
-
-# Keys of the cell file
 
 
 def cell_keys(_page: str = "") -> str:
@@ -163,9 +157,6 @@ def _default(value: dict[str, Any], is_required: bool) -> str:
     return f"`{shown}`"
 
 
-# Messages
-
-
 def messages(page: str) -> str:
     """Every message that the program raises, under what it is about, with what to do.
 
@@ -183,9 +174,6 @@ def messages(page: str) -> str:
         rows = sorted(found[heading], key=lambda row: row[0].lstrip(f"{GAP} '\"").lower())
         sections.append(f"### {heading}\n\n{table(['message', 'what to do'], rows)}")
     return "\n".join(sections)
-
-
-# The journal
 
 
 FIELDS = ROOT / "procedures" / "journal" / "fields.md"
@@ -243,20 +231,13 @@ def _heading_of(model: dict[str, Any]) -> str:
     return model["properties"].get("kind", {}).get("const") or model["title"]
 
 
-# Faults of devices
-
 FAULTS = ROOT / "tests" / "drivers" / "simulated" / "fault_table.md"
-
-
-def faults(_page: str = "") -> str:
-    """What becomes of each fault of a device, as the table of the test has it."""
-    return FAULTS.read_text(encoding="utf-8")
-
+"""What becomes of each fault of a device, as the table of the test has it."""
 
 PARTS: dict[str, Callable[[str], str]] = {
     "commands": commands,
     "cell keys": cell_keys,
     "messages": messages,
     "journal": journal,
-    "faults of devices": faults,
+    "faults of devices": lambda _page: FAULTS.read_text(encoding="utf-8"),
 }

@@ -129,10 +129,7 @@ def _texts(node: ast.expr, names: dict[str, list[str]]) -> list[str]:
         case ast.IfExp():
             return _texts(node.body, names) + _texts(node.orelse, names)
         case ast.JoinedStr():
-            text = ""
-            for part in node.values:
-                text += part.value if isinstance(part, ast.Constant) else GAP
-            return [text]
+            return ["".join(part.value if isinstance(part, ast.Constant) else GAP for part in node.values)]
         case ast.BinOp(op=ast.Add()):
             lefts, rights = _texts(node.left, names), _texts(node.right, names)
             return [left + right for left in lefts for right in rights]

@@ -44,8 +44,7 @@ class HeldOutPoses:
     def before(self, identified: Identification) -> PosesByPoint:
         """Poses that are measured before the write-back as well; a point with too few is left.
 
-        Raises:
-            LimitError: all points are.
+        Raises ``LimitError`` if all points are.
         """
         sets = [*held_out_sets(self.robot, self.settings, identified, self._turns())]
         failures = [one for one in sets if isinstance(one, LimitError)]

@@ -6,7 +6,8 @@ the cell file). Each attempt is an event, so the state of a run knows which acti
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 
 from drivers import errors as device
@@ -148,23 +149,18 @@ class Recovery:
                 failure = failure.model_copy(update={"reason": str(unstopped)})
             if (decided := await self._decide(failure)) is None:
                 raise error
-            state = self._recorded(decided, error)
+            if isinstance(error, GuardTripped):
+                self.record(events.Tripped.of(error.trip))
+            state = self.record(decided)
+            self.commands.set_flags(fault=None)
             try:
-                for event in await self.commands.run_cancellable(self._prepare(error, decided, state)):
-                    state = self.record(event)
-            except StepCancelled:
-                return
+                with suppress(StepCancelled):
+                    for event in await self.commands.run_cancellable(self._prepare(error, decided, state)):
+                        state = self.record(event)
             except HexacellError as another:
                 error = another
             else:
                 return
-
-    def _recorded(self, decided: events.Failed, error: HexacellError) -> RunState:
-        if isinstance(error, GuardTripped):
-            self.record(events.Tripped.of(error.trip))
-        state = self.record(decided)
-        self.commands.set_flags(fault=None)
-        return state
 
     async def _decide(self, failure: events.Failed) -> events.Failed | None:
         """The failure with the action to take, chosen by a person if need be; None to end the run."""
@@ -189,21 +185,14 @@ class Recovery:
         """Wait, reconnect lost devices, and give the sets that are invalid by that or by the action."""
         if not failure.asked:
             await self.executor.clock.sleep(self.executor.settings.recovery.wait_s)
-        is_zero_lost = False
+        keys, reason, step = list[SetKey](), failure.reason, failure.step
+        if failure.action is Action.REDO_SET:  # of a step without a set of its own, all that are open
+            keys = [key for key in state.open_sets if not isinstance(step, StepOfSet) or key == step.at]
         if failure.action is not Action.RETRY:
             known = state.started.devices if state.started else ()
-            is_zero_lost = await reconnect(self.executor.devices, error, known)
-        if is_zero_lost:
-            return _invalidated(state.sets_with_zero, "a gauge was opened again, its zero is void")
-        if failure.action is Action.REDO_SET:
-            step = failure.step  # without a set of its own, all that are open are concerned
-            keys = [key for key in state.open_sets if not isinstance(step, StepOfSet) or key == step.at]
-            return _invalidated(keys, failure.reason)
-        return []
-
-
-def _invalidated(keys: Sequence[SetKey], reason: str) -> list[events.SetInvalidated]:
-    return [events.SetInvalidated(at=key, reason=reason) for key in keys]
+            if await reconnect(self.executor.devices, error, known):
+                keys, reason = state.sets_with_zero, "a gauge was opened again, its zero is void"
+        return [events.SetInvalidated(at=key, reason=reason) for key in keys]
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,9 +15,6 @@ from procedures.devices.device_set import Devices
 
 T_co = TypeVar("T_co", covariant=True)
 
-RECOVERY_S = FRAME_GAP_S
-"""Silence that the driver requires after a garbled answer; it does not count against the device."""
-
 POLL_PAUSE_S = 0.02
 """Pause between two polls of one device, s of real time."""
 
@@ -69,7 +66,7 @@ class DevicePoller(Generic[T_co]):
         try:
             value = await self.read()
         except WrongAnswer as error:
-            self.line.silent_s = -RECOVERY_S
+            self.line.silent_s = -FRAME_GAP_S  # for so long the driver wants silence then
             self.error = error
             self.garbled_count += 1
             return

@@ -77,9 +77,7 @@ class Entry:
 def read_journal(path: Path, longest_line: int = LONGEST_LINE) -> tuple[Event, ...]:
     """All events of a journal, none of which has more than ``longest_line`` bytes.
 
-    Raises:
-        FileError: absent, written by a newer program, or damaged before its last line; the message
-            names the line.
+    Raises ``FileError`` with the line: absent, by a newer program, or damaged before its last line.
     """
     return tuple(entry.event for entry in read_entries(path, longest_line))
 

@@ -239,21 +239,15 @@ class Replayer:
 
     async def _interruption(self, event: events.Interrupted) -> None:
         """A failure without a device or the disk is computed again; any other is taken from the journal."""
-        if event.exit_code != ExitCode.OUT_OF_LIMITS:
-            self.report.taken += 1
-        elif self._current_step is None:
-            await self._undecided(event)
-        elif self._current_step.is_reproducible and self.scope.derives(self._current_step):
-            await self._outcome(self._current_step, event)
-        else:
-            self.report.taken += 1
-
-    async def _undecided(self, event: events.Interrupted) -> None:
-        """A failure of a decision, or between two steps."""
-        decided = await self._decided() if self.scope.decides else None
-        if isinstance(decided, Exception):
-            self.report.decisions += 1
-            self._compare_with(Aspect.DECISION, "deciding", event, decided)
+        is_computed, step = event.exit_code == ExitCode.OUT_OF_LIMITS, self._current_step
+        if is_computed and step is None and self.scope.decides:  # of a decision, or between two steps
+            decided = await self._decided()
+            if isinstance(decided, Exception):
+                self.report.decisions += 1
+                self._compare_with(Aspect.DECISION, "deciding", event, decided)
+                return
+        if is_computed and step is not None and step.is_reproducible and self.scope.derives(step):
+            await self._outcome(step, event)
         else:
             self.report.taken += 1
 

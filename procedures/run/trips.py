@@ -48,8 +48,6 @@ class Trip:
 class GuardTripped(DeviceError):
     """A guard stopped the robot, or kept it from moving; latched until it is cleared."""
 
-    exit_code = ExitCode.HARDWARE
-
     def __init__(self, trip: Trip) -> None:
         self.trip = trip
         super().__init__(trip.problem, subject=trip.device, action=trip.action)
@@ -61,8 +59,6 @@ class GuardTripped(DeviceError):
 
 class RobotNotStopped(SeveralErrors, DeviceError):
     """The robot may still move: it could not be stopped after an error, which comes second."""
-
-    exit_code = ExitCode.HARDWARE
 
     def __init__(self, stop_failure: HexacellError, error: HexacellError) -> None:
         super().__init__("the robot may still move", [stop_failure, *flatten_errors(error)])

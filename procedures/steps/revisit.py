@@ -6,9 +6,8 @@ from typing import ClassVar, Literal
 from drivers.errors import GaugeAtEnd
 from hexacell.errors import HexacellError, consists_only_of
 from hexacell.measurements.records import deviation_of
-from hexacell.noise.allowances import ReferenceChange
 from procedures.resources.run_resources import RunResources
-from procedures.run.keys import Phase, SetKey, ThreeNumbers
+from procedures.run.keys import Phase, ThreeNumbers
 from procedures.run.readings import Reading, in_words
 from procedures.run.state import RunState
 from procedures.steps.base import EventOfSet, StepOfSet
@@ -67,25 +66,14 @@ class Revisit(StepOfSet):
             return SetInvalidated(at=self.at, reason=str(error))
         await run.check_gauges()
         change = run.since_reference(state, self.at, reading)
-        return check_reference(self.at, change, reading, *run.settings.reference_agreement)
-
-
-def check_reference(
-    at: SetKey, change: ReferenceChange, now: Reading, limit_mm: float, joint_limit: float
-) -> ReferenceConfirmed | SetInvalidated:
-    """Whether gauges and encoders show at a set's reference what they showed before.
-
-    ``joint_limit`` is in the unit of the joint variables.
-    """
-    if change.exceeds(limit_mm):
-        shown = in_words(change.unexplained_mm)
-        reason = (
-            f"back at its reference the gauges show {shown} that the encoders do not explain, more than "
-            f"{limit_mm:g} mm"
-        )
-        return SetInvalidated(at=at, reason=reason, reading=now)
-    if (leg := change.leg_beyond(joint_limit)) is not None:
-        shown = f"{change.joints[leg]:+.3f}"
-        reason = f"back at its reference q{leg + 1} shows {shown}, more than {joint_limit:g}"
-        return SetInvalidated(at=at, reason=reason, reading=now)
-    return ReferenceConfirmed(at=at, change_mm=deviation_of(change.unexplained_mm), reading=now)
+        limit_mm, joint_limit = run.settings.reference_agreement
+        if change.exceeds(limit_mm):
+            shown = f"the gauges show {in_words(change.unexplained_mm)} that the encoders do not explain"
+            reason = f"back at its reference {shown}, more than {limit_mm:g} mm"
+            return SetInvalidated(at=self.at, reason=reason, reading=reading)
+        if (leg := change.leg_beyond(joint_limit)) is not None:
+            shown = f"q{leg + 1} shows {change.joints[leg]:+.3f}"
+            reason = f"back at its reference {shown}, more than {joint_limit:g}"
+            return SetInvalidated(at=self.at, reason=reason, reading=reading)
+        change_mm = deviation_of(change.unexplained_mm)
+        return ReferenceConfirmed(at=self.at, change_mm=change_mm, reading=reading)

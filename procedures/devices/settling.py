@@ -30,9 +30,8 @@ TRIMMED = 8
 class DeviceSnapshot:
     """All devices read once, at the same time.
 
-    Attributes:
-        at_s: when the last of them had answered, by the cell's clock.
-        skew_s: by how much the first one had answered earlier.
+    ``at_s`` is when the last of them had answered, by the cell's clock, ``skew_s`` how much earlier the
+    first had.
     """
 
     at_s: float

@@ -236,9 +236,8 @@ def encode(entry: Entry) -> bytes:
 def decode(line: bytes, path: Path, due: int) -> Entry | None:
     """The entry in line ``due`` of the journal ``path``, None if the line is damaged.
 
-    Raises:
-        FileError: the line is whole, but not the one that is due, or of a version or an event that
-            this program does not know.
+    Raises ``FileError`` for a whole line that is not the one that is due, or of a version or an event that
+    this program does not know.
     """
     if not line.endswith(b"\n") or not is_whole(line[:-1]):
         return None

@@ -74,14 +74,10 @@ class Difference:
 
 @dataclass
 class ReplayReport:
-    """A run that is replayed, and the findings so far.
+    """A run that is replayed, by which software it was recorded, and the findings so far.
 
-    Attributes:
-        recorded_by: the software that recorded it.
-        events: how many events its journal has.
-        decisions: how many decisions were computed again.
-        results: how many outcomes were computed again.
-        taken: how many other events were taken from the journal.
+    ``events`` is how many its journal has, ``decisions`` and ``results`` are how many of these were
+    computed again, ``taken`` is how many other events were taken from the journal.
     """
 
     journal: Path
@@ -180,12 +176,7 @@ class Scope(StrEnum):
 
 @dataclass(eq=False)
 class Replayer:
-    """Replays one recorded run.
-
-    Args:
-        executor: executes steps in a temporary folder.
-        report: gets the findings.
-    """
+    """Replays one recorded run in a temporary folder; ``report`` gets the findings."""
 
     executor: RecordedStepExecutor
     report: ReplayReport

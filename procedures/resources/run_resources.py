@@ -43,9 +43,8 @@ ARRIVAL_PIECES = 240
 class RunResources:
     """The resources of one run; a replay has others of the same kind.
 
-    Attributes:
-        most_refusals: the controller refuses at most so many poses of one set; then a person is to look at
-            its limits.
+    The controller refuses at most ``most_refusals`` poses of one set; then a person is to look at its
+    limits.
     """
 
     cell: Cell

@@ -80,6 +80,16 @@ def mean_leg_temperatures(
     return tuple(float(column.mean()) if len(column) else None for column in columns)
 
 
+def temperatures_shown(readings: Iterable[Reading]) -> dict[str, list[float]]:
+    """What each thermometer showed at some records, deg C, by name; without those that never answered."""
+    shown: dict[str, list[float]] = {}
+    for reading in readings:
+        for one in reading.temperatures:
+            if one.celsius is not None:
+                shown.setdefault(one.name, []).append(one.celsius)
+    return shown
+
+
 def mean_temperature(readings: Iterable[Reading]) -> float | None:
     """The mean, deg C, of all that thermometers showed at some records; None if there was nothing."""
     every = [one.celsius for reading in readings for one in reading.temperatures]

@@ -16,7 +16,7 @@ from hexacell.kinematics.corrections import NO_CORRECTIONS
 from hexacell.measurements.records import Directions, MeasurementSet, Record
 from hexacell.results.term_result import FoundTerms
 from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
-from procedures.run.readings import Reading
+from procedures.run.readings import Reading, temperatures_shown
 from procedures.run.set_state import SetState
 
 if TYPE_CHECKING:  # a state keeps events whole, and needs their names in its annotations alone
@@ -218,11 +218,7 @@ class RunState:
 
         ``but``: the names of those that are left out if there are others.
         """
-        shown: dict[str, list[float]] = {}
-        for sample in self.samples(Phase.IDENTIFY):
-            for temperature in sample.reading.temperatures:
-                if temperature.celsius is not None:
-                    shown.setdefault(temperature.name, []).append(temperature.celsius)
+        shown = temperatures_shown(sample.reading for sample in self.samples(Phase.IDENTIFY))
         counted = shown.keys() - set(but) or shown.keys()
         return max((max(shown[name]) - min(shown[name]) for name in counted), default=None)
 

@@ -6,6 +6,7 @@ from typing import ClassVar, Literal
 from hexacell.config.change import ConfigChange
 from hexacell.config.write_record import WriteKind
 from hexacell.errors import LimitError
+from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.resources.run_resources import RunResources
 from procedures.run.questions import PendingChange, ask_approval
 from procedures.run.state import RunState
@@ -48,16 +49,22 @@ class Commit(StepWithoutMotion):
 
     async def _approval(self, run: RunResources, state: RunState, change: ConfigChange) -> str:
         """Who approves: the cell file where all gates passed, or a person."""
-        proposed = state.proposed
-        conditions = proposed.gates if proposed else ()
+        conditions = state.proposed.gates if state.proposed else ()
         automatic = run.settings.acceptance.approval == "automatic"
         if automatic and all(gate.passed for gate in conditions):
             return "the cell file: within its limits"
-        moved = proposed.displacement if proposed else None
-        improvement = state.identified.improvement if state.identified else None
-        corrections, terms = change.changed_corrections, state.found_terms
-        pending = PendingChange(conditions, change.diff, moved, improvement, corrections, terms)
+        pending = pending_change(state, change, conditions)
         name = await run.operator.ask(ask_approval(pending, cell=run.settings.name))
         if name is None:
             raise LimitError("the new geometry was declined; nothing was applied")
         return name
+
+
+def pending_change(
+    state: RunState, change: ConfigChange, conditions: tuple[AcceptanceGate, ...]
+) -> PendingChange:
+    """The proposed change of a run, with the gates for writing it, as a person is asked about it."""
+    moved = state.proposed.displacement if state.proposed else None
+    improvement = state.identified.improvement if state.identified else None
+    corrections, terms = change.changed_corrections, state.found_terms
+    return PendingChange(conditions, change.diff, moved, improvement, corrections, terms)

@@ -23,6 +23,7 @@ from hexacell.verdict.verification import (
 from procedures.calibration.held_out_poses import confirming_poses
 from procedures.resources.run_resources import RunResources
 from procedures.run.keys import Phase, SixNumbers
+from procedures.run.readings import temperatures_shown
 from procedures.run.state import RunState
 from procedures.steps.base import BaseEvent, Computation
 from procedures.steps.sample import RecordTaken
@@ -112,16 +113,11 @@ def _length_checked(run: RunResources, state: RunState) -> ResultValidated:
 
 def _length_measurements(settings: CellSettings, state: RunState) -> LengthMeasurements:
     """What was measured in the two seats, and the fixture's temperature if it has a thermometer."""
-    samples = state.samples(Phase.LENGTH)
-    named = settings.length_check and settings.length_check.thermometer
-    shown = [
-        one.celsius
-        for sample in samples
-        for one in sample.reading.temperatures
-        if one.name == named and one.celsius is not None
-    ]
+    samples, fixture = state.samples(Phase.LENGTH), settings.length_check
+    shown = temperatures_shown(sample.reading for sample in samples)
+    celsius = shown.get((fixture and fixture.thermometer) or "")
     records = MeasurementSet(tuple(sample.record for sample in samples))
-    return LengthMeasurements(records, fmean(shown) if shown else None)
+    return LengthMeasurements(records, fmean(celsius) if celsius else None)
 
 
 def _held_out(settings: CellSettings, state: RunState) -> HeldOut:

@@ -41,7 +41,8 @@ class HeldOutSteps:
 
     def way_back(self, state: RunState, key: SetKey) -> Step:
         """The next move to the reference of a set; raises ``HexacellError`` if no safe path leads there."""
-        is_in_order = self.sets.is_in_order(state, key)
+        # By the set's own moves, each of which was checked when it was chosen.
+        is_in_order = not state.off_plan and (state.at_pose is None or state.at_pose[0] == key)
         return reference_move(state, key) if is_in_order else self._to_reference(state, key)
 
     def _poses(self, state: RunState, key: SetKey) -> tuple[tuple[SixNumbers, ...], int]:

@@ -70,10 +70,8 @@ class SetSteps:
     def due_first(self, state: RunState, key: SetKey, ball: Array | None) -> Step | None:
         """What an open set needs before anything else is measured; None if it needs nothing.
 
-        ``ball`` (3,), mm, is where the ball was when the gauges were zeroed, if that is known.
-
-        Raises:
-            LimitError: the gauges are to be tried, and no small move is possible.
+        ``ball`` (3,), mm, is where the ball was when the gauges were zeroed, if that is known. Raises
+        ``LimitError`` if the gauges are to be tried, and no small move is possible.
         """
         if state.set(key).reference_unverified:
             return self.at_or_to_reference(state, key, ball)
@@ -136,19 +134,12 @@ class SetSteps:
         move = next_return_move(belief, zero.reference, commands, departure)
         return moves[move] if isinstance(move, int) else self._waypoint(key, move)
 
-    def is_in_order(self, state: RunState, key: SetKey) -> bool:
-        """Whether the robot came by the set's own moves, each of which was checked when it was chosen."""
-        return not state.off_plan and (state.at_pose is None or state.at_pose[0] == key)
-
     def towards(self, state: RunState, goal: Move, reference: Array | None = None) -> Move:
         """The next move towards ``goal``: ``goal`` itself if the straight line to it is clear.
 
         With gauges zeroed where the ball was at ``reference`` (3,), mm, the ball stays inside their
         travel on the path, unless it is outside already. After an interruption the robot may be far from
-        the set's gauges.
-
-        Raises:
-            NoSafePath: there is no path.
+        the set's gauges. Raises ``NoSafePath``.
         """
         if state.target is None:
             return goal

@@ -44,9 +44,8 @@ def bus_settings(settings: EncoderSettings) -> dict[str, object]:
 class BankSession(ABC):
     """An open bus; used by one thread. A subclass connects at its creation.
 
-    Attributes:
-        identities: those of the encoders of legs 1 to 6, after :meth:`start`.
-        subjects: those of messages about legs 1 to 6.
+    ``identities`` are those of the encoders of legs 1 to 6, after :meth:`start`; ``subjects`` those of
+    messages about these.
     """
 
     identities: tuple[DeviceIdentity, ...]
@@ -108,8 +107,7 @@ Session = TypeVar("Session", bound=BankSession)
 class ThreadedBank(Generic[Session]):
     """A :class:`drivers.interfaces.EncoderBank` of sessions on a thread; ``trace`` gets all traffic.
 
-    Attributes:
-        session: opens the bus, by settings, the event that interrupts every wait, and ``trace``.
+    ``session`` opens the bus, by settings, the event that interrupts every wait, and ``trace``.
     """
 
     session: ClassVar[type[Any]]

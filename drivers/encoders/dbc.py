@@ -58,21 +58,16 @@ class PositionSignal:
 def read_signals(settings: DbcSettings, unit: JointUnit, step: float) -> tuple[PositionSignal, ...]:
     """The signals of legs 1 to 6; ``step`` is one count in the unit of the joint variables.
 
-    Raises:
-        UsageError: cantools is not installed.
-        FileError: the file cannot be read, or lacks a message, a signal, a unit or a range.
+    Raises ``FileError`` if the file cannot be read, or lacks a message, signal, unit or range; a
+    ``UsageError`` without cantools.
     """
-    cantools = _cantools()
+    cantools = optional("cantools", "dbc", "encoders")
     try:
         found = cantools.database.load_file(settings.file)
     except (OSError, UnicodeDecodeError, cantools.Error) as error:
         raise FileError(f"cannot be read: {error}", subject=settings.file, action="Correct it") from error
     named = enumerate(settings.signals, 1)
     return tuple(_signal(found, settings, leg, name, unit, step) for leg, name in named)
-
-
-def _cantools() -> Any:  # noqa: ANN401 - a module
-    return optional("cantools", "dbc", "encoders")
 
 
 def _signal(
@@ -187,7 +182,7 @@ class DbcSession(BankSession):
             return _Received(now, 0.0, problem)
         try:
             values = signal.message.decode(data, decode_choices=False)
-        except _cantools().Error as error:
+        except optional("cantools", "dbc", "encoders").Error as error:
             return _Received(now, 0.0, f"sends what the DBC file does not describe ({error})")
         if (value := values.get(signal.signal.name)) is None:
             return None

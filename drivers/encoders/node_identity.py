@@ -179,12 +179,7 @@ HOW_IT_IS_SET = {
 
 @dataclass(frozen=True, slots=True)
 class DataSheet:
-    """The values of one file.
-
-    Attributes:
-        path: of the file.
-        values: by entry, as unsigned integers.
-    """
+    """The values of one file by their entries, as unsigned integers."""
 
     path: Path
     values: dict[ObjectEntry, int]

@@ -37,8 +37,7 @@ class JointPositions(Protocol):
 class ControllerScales:
     """``drivers.interfaces.EncoderBank`` of the scales at a controller; opened and closed with that.
 
-    Raises:
-        UsageError: this controller does not report its joints.
+    Raises ``UsageError`` for a controller that does not report its joints.
     """
 
     def __init__(
@@ -61,13 +60,7 @@ class ControllerScales:
         )
 
     async def read(self) -> EncoderSample:
-        """One sample.
-
-        Raises:
-            NotHomedError: the joints are not homed.
-            DeviceError: the controller does not answer.
-            FileError: its config has no zeros.
-        """
+        """One sample; raises ``NotHomedError``, ``DeviceError``, or ``FileError`` if no zeros are known."""
         joints = await self._controller.joints_now()
         if joints is None:
             raise NotHomedError(

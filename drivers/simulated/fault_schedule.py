@@ -84,11 +84,7 @@ def _set_stop_file(stop_file: Path, *, on: bool) -> None:
 class FaultSchedule(Closeable):
     """Injects and clears scheduled faults, from timers, in the order in which they are due.
 
-    Attributes:
-        move_count: how many moves have started.
-
-    Raises:
-        UsageError: a scheduled fault cannot be simulated.
+    ``move_count`` is how many moves have started. Raises ``UsageError`` if a fault cannot be simulated.
     """
 
     def __init__(

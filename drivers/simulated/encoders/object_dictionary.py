@@ -28,10 +28,6 @@ class Vendor:
     mapping_writable: bool = True
     magnets: int = 1
 
-    @property
-    def is_rotary(self) -> bool:
-        return self.device_type == MULTI_TURN
-
 
 MULTI_TURN = 0x0002_0196
 
@@ -116,7 +112,7 @@ def _objects(vendor: Vendor, data: DeviceData) -> Iterator[_Row]:
         yield (POSITION_OF_MAGNET, 0, "number of magnets", UNSIGNED8, vendor.magnets, "ro")
         for magnet in range(1, vendor.magnets + 1):
             yield (POSITION_OF_MAGNET, magnet, f"position of magnet {magnet}", position, 0, "ro")
-    if vendor.is_rotary:
+    if vendor.device_type == MULTI_TURN:
         yield (0x6001, 0, "measuring units per revolution", UNSIGNED32, step, "ro")
     elif vendor.step_in_6005:
         yield (0x6005, 0, "number of step settings", UNSIGNED8, 2, "ro")

@@ -22,9 +22,7 @@ InstrumentFactory = Callable[..., Instrument]
 def instrument_class(protocol: str) -> InstrumentFactory:
     """The simulated instrument that is announced for a protocol, by this program or a plug-in.
 
-    Raises:
-        FileError: there is no such simulated instrument.
-        UsageError: a plug-in for it cannot be loaded.
+    Raises ``FileError`` if there is none, ``UsageError`` if the plug-in for it cannot be loaded.
     """
     known = names(Group.SIMULATED_GAUGES)
     if protocol not in known:

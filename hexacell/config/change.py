@@ -124,10 +124,8 @@ def propose(
 
     Without ``corrections`` it keeps those that it has. ``fingerprint_at_start`` is the
     :func:`~hexacell.config.layout.fingerprint` of the config when the run began: the measurements were
-    commanded with that geometry and are meaningless with another.
-
-    Raises:
-        FileError: the config changed since, is invalid, or has no place for ``corrections``.
+    commanded with that geometry and are meaningless with another. Raises ``FileError`` if the config
+    changed since, is invalid, or has no place for ``corrections``.
     """
     contents = read_contents(paths)
     require_fingerprint(paths[0], contents, fingerprint_at_start)

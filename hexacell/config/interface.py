@@ -105,10 +105,8 @@ class ConfigFormat(Protocol):
     ) -> str:
         """``text`` with other values of all parameters that it has; every other character is kept.
 
-        With ``corrections`` it gets all numbers of these; those that are absent are added.
-
-        Raises:
-            FileError: ``text`` is not such a config, or cannot hold these numbers.
+        With ``corrections`` it gets all numbers of these; those that are absent are added. Raises
+        ``FileError`` if ``text`` is not such a config, or cannot hold these numbers.
         """
 
 

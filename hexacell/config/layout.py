@@ -82,9 +82,8 @@ class ConfigLayout:
     def read(self, *paths: Path) -> ControllerGeometry:
         """The geometry in the files, and the corrections.
 
-        Raises:
-            FileError: with file and line: a file is absent, unreadable or no such config, or a parameter is
-                in none of the files, or in two.
+        Raises ``FileError``, with file and line, if a file is absent, unreadable or no such config, or a
+        parameter is in none of the files, or in two.
         """
         parts = self._parts([atomic_files.read_text(path, LARGEST_CONFIG_BYTES) for path in paths], paths)
         values = self._values(parts, paths)
@@ -103,10 +102,8 @@ class ConfigLayout:
         """The texts with the values of ``geometry`` and ``corrections``; every other character is kept.
 
         Without ``corrections`` they stay as they are. New texts are read again before they are returned.
-
-        Raises:
-            FileError: a text is no such config, or cannot hold its part of these; or the geometry has
-                values that no config may get.
+        Raises ``FileError`` if a text is no such config, or cannot hold its part of these; or if the
+        geometry has values that no config may get.
         """
         _require_physical(geometry)
         values = dict(zip(self.parameters.names, geometry.vector.tolist(), strict=True))

@@ -250,7 +250,6 @@ def _with_backlash(ini: IniText, joint: str, unit_mm: float, wanted: float) -> s
     return ini.with_variable(joint, f"{BACKLASH} = {number}")
 
 
-LINEAR, ANGULAR = "XYZ", "ABC"
 ROTARY_JOINT = "ANGULAR"
 
 
@@ -268,10 +267,7 @@ def limits_of_ini(path: Path, unit_mm: float = 1.0) -> ControllerLimits:
 def limits_in(ini: IniText, unit_mm: float) -> ControllerLimits:
     """The limits in a text."""
     joints = [_range(ini, section, 1.0 if _turns(ini, section) else unit_mm) for section in JOINTS]
-    axes = [
-        *(_range(ini, f"AXIS_{axis}", unit_mm) for axis in LINEAR),
-        *(_range(ini, f"AXIS_{axis}", 1.0) for axis in ANGULAR),
-    ]
+    axes = [_range(ini, f"AXIS_{axis}", unit_mm if axis in "XYZ" else 1.0) for axis in "XYZABC"]
     stated = [one for one in joints if one is not None]
     return ControllerLimits(
         joints=tuple(stated) if len(stated) == LEGS else None, axes=tuple(axes) if any(axes) else None

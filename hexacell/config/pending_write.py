@@ -99,10 +99,8 @@ def is_interrupted(paths: Sequence[Path]) -> bool:
 def settle_interrupted_write(paths: Sequence[Path]) -> str | None:
     """Undo what a process that died left of a write; what became of it, None if there is nothing.
 
-    The caller must hold the cell: a write that is going on looks the same.
-
-    Raises:
-        FileError: a file was edited since, or cannot be written; nothing else is changed then.
+    The caller must hold the cell: a write that is going on looks the same. Where a file was edited since,
+    or cannot be written, that is a ``FileError``, and nothing else is changed.
     """
     if not is_interrupted(paths):
         return None
@@ -153,9 +151,8 @@ def _readers(path: Path) -> int:
 def held_config(*paths: Path) -> Iterator[None]:
     """Hold the cell whose config these files are until the context ends; never waits.
 
-    Raises:
-        CellBusy: another process holds it.
-        FileError: a write of its config was interrupted since the command began. It is settled now.
+    Raises ``CellBusy`` if another process holds it, and ``FileError`` if a write of its config was
+    interrupted since the command began, which is settled now.
     """
     with cell_lock(*paths):
         if (settled := settle_interrupted_write(paths)) is not None:
@@ -164,13 +161,7 @@ def held_config(*paths: Path) -> Iterator[None]:
 
 
 def settle_config(*paths: Path) -> str | None:
-    """Settle what a killed process left of a write; gives what became of it, None if there is nothing.
-
-    Where another process holds the cell, it is left to that one.
-
-    Raises:
-        FileError: a file was edited since, or cannot be written.
-    """
+    """As :func:`settle_interrupted_write`; where another process holds the cell, it is left to that one."""
     if not is_interrupted(paths):
         return None
     try:

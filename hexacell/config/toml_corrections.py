@@ -90,11 +90,8 @@ def validated(document: TomlDocument, model: type[Model]) -> Model:
 def with_corrections(text: str, corrections: Corrections) -> str:
     """``text`` with these corrections; raises ``FileError`` where it holds what is no correction."""
     document = TomlDocument.parse(text)
-    before, tokens, added = (
-        validated(document, WithCorrections).corrections,
-        dict[KeyPath, str](),
-        dict[str, str](),
-    )
+    before = validated(document, WithCorrections).corrections
+    tokens, added = dict[KeyPath, str](), dict[str, str]()
     for key in TomlCorrections.model_fields:
         old, new = _numbers(before, key), _numbers(corrections, key)
         decimals = DECIMALS_OF_DIRECTION if key == "weight_direction" else DECIMALS

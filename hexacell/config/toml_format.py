@@ -59,7 +59,7 @@ class NativeToml:
         """All parameters, or the kinds that ``[geometry]`` has; raises ``FileError`` with the line."""
         document = TomlDocument.parse(text, source)
         there, found = self._content(document)
-        vector = _geometry(there, found).vector.tolist() if there.kinds else []
+        vector = Geometry.of(there, found["geometry"]).vector.tolist() if there.kinds else []
         branch: Branch | None = None if self._is_part else ()
         if there.has_branch:
             branch = found.get("branch") or found["geometry"]["branch"]
@@ -83,7 +83,8 @@ class NativeToml:
         document = TomlDocument.parse(text)
         (there, found), tokens = self._content(document), dict[KeyPath, str]()
         if there.kinds:
-            before, after = _geometry(there, found), Geometry(there, [values[name] for name in there.names])
+            before = Geometry.of(there, found["geometry"])
+            after = Geometry(there, [values[name] for name in there.names])
             for kind in there.kinds:
                 old, half_of_last = before[kind.symbol], 0.5 * 10.0**-kind.unit.decimals
                 for index, new in np.ndenumerate(after[kind.symbol]):
@@ -109,10 +110,6 @@ class NativeToml:
 def native_layout(parameters: ParameterSet) -> ConfigLayout:
     """The layout of a config that is one file in this format."""
     return ConfigLayout(parameters, (FormatOfFile("toml", NativeToml(parameters, {})),))
-
-
-def _geometry(parameters: ParameterSet, content: Mapping[str, Any]) -> Geometry:
-    return Geometry.of(parameters, content["geometry"])
 
 
 def _has_ranges(axes: object) -> bool:

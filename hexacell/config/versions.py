@@ -44,11 +44,7 @@ class ConfigVersions:
 
 
 class ConfigEditedSince(FileError):
-    """The config is neither as it was before a run nor as the run wrote it.
-
-    Attributes:
-        versions: all three.
-    """
+    """The config is neither as it was before a run nor as the run wrote it; ``versions`` are all three."""
 
     def __init__(self, problem: str, versions: ConfigVersions, *, path: Path, action: str) -> None:
         super().__init__(problem, subject=path, action=action)

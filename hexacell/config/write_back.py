@@ -53,9 +53,8 @@ def commit(change: ConfigChange, backup_folder: Path) -> Receipt:
 def rollback(receipt: Receipt) -> None:
     """Restore the config as it was before the commit, byte for byte; may be repeated.
 
-    Raises:
-        FileError: the config is not the one that was written, the backup is missing, or the config cannot
-            be written; the message says so if it was replaced nevertheless.
+    Raises ``FileError`` if the config is not the one that was written, the backup is missing, or the config
+    cannot be written; the message says so if it was replaced nevertheless.
     """
     before = receipt.backup()
     found = read_contents(receipt.paths)
@@ -74,9 +73,8 @@ def rollback(receipt: Receipt) -> None:
 def restore(paths: tuple[Path, ...], contents: Contents, *, expected: Contents) -> None:
     """Replace the config by an earlier version, while it is as ``expected``, and read it back.
 
-    Raises:
-        FileError: it has changed, or cannot be written; of several files no one is replaced then. If even
-            that fails, the next command that uses the cell does it.
+    If it has changed or cannot be written, that is a ``FileError``, and of several files none is replaced.
+    If even that fails, the next command that uses the cell does it.
     """
     replacement = Replacement(paths, expected, contents)
     try:
@@ -237,10 +235,8 @@ class Replacement:
         """Give the files their old content again and remove the note.
 
         ``all_of_them``: also those that hold neither their old nor their new content. ``keep`` is given
-        what they hold, so that it is not lost; the others are somebody's edit and stay.
-
-        Raises:
-            FileError: of the last file that could not be restored; the others were.
+        what they hold, so that it is not lost; the others are somebody's edit and stay. Raises the
+        ``FileError`` of the last file that could not be restored; the others were.
         """
         failure: FileError | None = None
         for one in self.changed:

@@ -204,12 +204,9 @@ _FOR_GROUP = 0o020
 
 
 def append_line(path: Path, line: bytes) -> None:
-    """Add a line, given without its line feed; one process at a time may do that.
+    """Add a line, given without its line feed; one process at a time may do that. Raises ``FileError``.
 
     Whoever may put files into the folder as a member of its group may add lines to a new file, too.
-
-    Raises:
-        FileError: the line is not in the file.
     """
     with atomic_files.os_errors("cannot be written", path):
         is_new = True

@@ -90,11 +90,8 @@ def _keep(error: Exception, typed: Sequence[str]) -> Path:
 def require_platform(target: str) -> None:
     """Refuse a command, by module and function, that this operating system cannot carry out.
 
-    Nothing of it is imported.
-
-    Raises:
-        UsageError: it has no POSIX locks and terminals (Windows), or does not report who is at the other
-            end of a local socket as Linux does (macOS).
+    Nothing of it is imported. Raises ``UsageError`` without POSIX locks and terminals (Windows), or without
+    a report of who is at the other end of a local socket, as Linux has it (macOS).
     """
     if target != "completion.main" and find_spec("fcntl") is None:
         raise UsageError(
@@ -115,15 +112,11 @@ FORMAT = "%(asctime)s.%(msecs)03dZ %(levelname)s %(name)s: %(message)s"
 
 @contextmanager
 def log(file: Path | None, verbosity: int) -> Iterator[None]:
-    """Log within this context: to a file, or with ``verbosity`` alone to stderr.
+    """Log within this context: to a file, or with ``verbosity`` alone to stderr; raises ``FileError``.
 
     The log stands beside the journal of a run and replaces no part of it. Every module logs to a logger of
-    its own; ``drivers.wire`` has the bytes on the lines.
-
-    The level is INFO; it is DEBUG, with the bytes on the lines, where both are given or ``verbosity`` is 2.
-
-    Raises:
-        FileError: the file cannot be written.
+    its own; ``drivers.wire`` has the bytes on the lines. The level is INFO; it is DEBUG, with the bytes on
+    the lines, where both are given or ``verbosity`` is 2.
     """
     try:
         handler = logging.StreamHandler() if file is None else logging.FileHandler(file, encoding="utf-8")

@@ -26,8 +26,7 @@ PLAIN_TERMINALS = {"dumb", "unknown"}
 class RunProgress:
     """A listener of the engine that prints events and moves ``bar``, a context manager.
 
-    Attributes:
-        has_started: whether the run exists on the disk, and so can be resumed.
+    ``has_started`` is whether the run exists on the disk, and so can be resumed.
     """
 
     def __init__(self, console: Console, expected_records: int) -> None:

@@ -49,11 +49,8 @@ class SignalCommands:
     def run(self, work: Coroutine[Any, Any, Result]) -> Result:
         """``asyncio.run`` with signals turned into commands.
 
-        Before an engine reads the queue, a signal cancels the work, which then cleans up. After the
-        engine has ended, a signal has no effect.
-
-        Raises:
-            Interruption: a signal cancelled the work.
+        Before an engine reads the queue, a signal cancels the work, which then cleans up, and an
+        ``Interruption`` is raised. After the engine has ended, a signal has no effect.
         """
         # An ignored one stays so, as Ctrl-C in a script's background job.
         heeded = [number for number in ENDING_SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]

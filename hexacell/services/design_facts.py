@@ -77,12 +77,7 @@ def stated_poses(settings: CellSettings, *, has_list: bool) -> Iterator[StatedPo
 
 
 def require_design(cell: Cell) -> None:
-    """Refuse a design that is wrong as a whole.
-
-    Raises:
-        FileError: one thing is, with its line.
-        SeveralErrors: more than one is.
-    """
+    """Raise ``FileError`` for a design that is wrong as a whole, ``SeveralErrors`` if in several ways."""
     if facts := [*design_facts(cell)]:
         raise joined(f"{cell.path} has {len(facts)} mistakes", facts)
 

@@ -191,9 +191,7 @@ def _decide(
 def require_stated_poses(cell: Cell) -> None:
     """Check that the design can work, and that the controller can take every stated pose within the limits.
 
-    Raises:
-        FileError: the design is wrong, or one pose is out of reach; with its line.
-        SeveralErrors: more than one is.
+    Raises ``FileError``, with its line, if something is wrong, ``SeveralErrors`` if more than one thing is.
     """
     require_design(cell)
     plan = plan_of(cell)

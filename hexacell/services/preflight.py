@@ -27,12 +27,9 @@ _LISTENING = "0A"
 def toggle_exclusion(cell: Cell, name: str, planned: Sequence[VisitedPose]) -> Cell:
     """Exclude a point (``3``) or a planned pose (``3.2``), or remove the first exclusion (``e1``).
 
-    Returns:
-        The cell as its file states it now.
-
-    Raises:
-        UsageError: nothing has this name, or it is the reference of a point.
-        FileError: too little would be left, or the file has changed or cannot be edited.
+    Gives the cell as its file states it now. Raises ``UsageError`` if nothing has this name, or it is the
+    reference of a point, and ``FileError`` if too little would be left, or the file has changed or cannot
+    be edited.
     """
     stated = [(one.point, one.pose) for one in cell.settings.exclusions]
     if name.startswith("e") and name[1:].isdecimal() and 0 < int(name[1:]) <= len(stated):

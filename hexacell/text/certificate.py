@@ -52,9 +52,8 @@ register_namespace("si", "https://ptb.de/si")
 def certificate_of_run(run: ReportedRun) -> bytes:
     """The certificate as XML, unsigned; the same each time.
 
-    Raises:
-        UsageError: nothing was found of the errors at the task poses, or the cell file left out who
-            calibrates what for whom.
+    Raises ``UsageError`` if nothing was found of the errors at the task poses, or the cell file left out
+    who calibrates what for whom.
     """
     accuracy, stated = run.state.accuracy, run.settings.report
     if accuracy is None:

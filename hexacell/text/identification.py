@@ -26,7 +26,8 @@ def identification_report(assessed: Assessment) -> str:
     if budget is not None and not assessed.refused:
         expanded = f" U at the task poses is {shown(budget.expanded_mm)}."
     pairs = [wrapped(sentence, indent=2) for sentence in pair_sentences(assessed)]
-    more = len(assessed.correlated) - len(pairs)
+    if more := len(assessed.correlated) - len(pairs):
+        pairs.append(f"and {counted(more, 'more pair')} beyond 0.9 (--json lists them)")
     parts = (
         "\n".join(wrapped(sentence) for sentence in findings(assessed)),
         wrapped(f"Verdict: {Verdict.NOT_EVALUATED}, as no held-out records test this model.{expanded}"),
@@ -44,12 +45,7 @@ def identification_report(assessed: Assessment) -> str:
         noise_table(assessed.noise),
         "" if assessed.measured_noise is None else measured_noise_text(assessed.measured_noise),
         repeatability_lines(assessed.repeatability),
-        "\n".join(
-            [
-                *pairs,
-                *([f"and {counted(more, 'more pair')} beyond 0.9 (--json lists them)"] if more else []),
-            ]
-        ),
+        "\n".join(pairs),
     )
     return "\n\n".join(part for part in parts if part)
 

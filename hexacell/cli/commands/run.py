@@ -159,10 +159,8 @@ def _copied(request: RunRequest, stream: EventStream | None) -> list[Listener]:
 def execute_run(request: RunRequest, console: Console, further: Sequence[Listener] = ()) -> events.Ended:
     """Carry out a run with a progress bar; ``further`` listeners hear of every event too.
 
-    Ctrl-C, SIGTERM or SIGHUP ends it after the step in progress, a second Ctrl-C at once.
-
-    Raises:
-        HexacellError: it could not begin, could not continue, or was stopped.
+    Ctrl-C, SIGTERM or SIGHUP ends it after the step in progress, a second Ctrl-C at once. Raises
+    ``HexacellError``.
     """
     listed = pose_list_of(request.cell)
     expected = expected_records(

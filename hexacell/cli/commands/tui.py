@@ -24,9 +24,7 @@ if TYPE_CHECKING:
 def main(options: argparse.Namespace, _: Console) -> ExitCode:
     """Show the screen until the person leaves it; then the process ends at once.
 
-    Raises:
-        UsageError: there is no terminal.
-        FileError: the key map cannot be read.
+    Raises ``UsageError`` without a terminal, ``FileError`` if the key map cannot be read.
     """
     _require_terminal()
     end_with_terminal(sys.stdin.fileno())

@@ -55,9 +55,7 @@ def begun_in_window(
 ) -> events.Ended:
     """Begin a run; where that is refused, note why, wait, and try again while its window is open.
 
-    Raises:
-        Interruption: a signal ended it.
-        HexacellError: the last refusal, or what ended the run.
+    Raises ``Interruption`` after a signal, else the last refusal, or what ended the run.
     """
     if not request.keeps_hours:
         return begin()

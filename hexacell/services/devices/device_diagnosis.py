@@ -94,10 +94,7 @@ class DeviceDiagnosis:
 async def diagnose(cell: Cell, device: str, seconds: float) -> DeviceDiagnosis:
     """Watch a gauge, by its name, or ``encoders``.
 
-    Raises:
-        UsageError: the cell has no such device.
-        CellBusy: a run uses it.
-        HexacellError: the device cannot be opened.
+    Raises ``UsageError`` for an unknown device, ``CellBusy``, or ``HexacellError`` if it cannot be opened.
     """
     known = [gauge.name for gauge in cell.settings.gauges] + [ENCODERS]
     if device not in known:

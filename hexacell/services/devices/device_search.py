@@ -26,12 +26,7 @@ from hexacell.services.devices.first_cell import BITRATE, GAUGE_AXES, CellDraft,
 
 @dataclass(frozen=True)
 class SearchFindings:
-    """What was found.
-
-    Attributes:
-        ports: those that were looked at, also where nothing answered.
-        untried: protocols in which nothing was asked.
-    """
+    """What was found; all ``ports`` that were looked at, and the protocols in which nothing was asked."""
 
     ports: tuple[SerialPortFound, ...]
     gauges: tuple[PortFindings, ...]

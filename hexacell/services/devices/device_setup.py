@@ -27,8 +27,7 @@ from procedures.run.cancellation import shielded
 def device_addresses(cell: Cell, *, other_processes: bool = False) -> Iterator[CellSettings]:
     """The cell's settings with an address for every device; within this context a simulated cell runs.
 
-    Raises:
-        HexacellError: a protocol has no driver, a password cannot be read, or the simulation cannot start.
+    Raises ``HexacellError``: a protocol without driver, an unreadable password, an impossible simulation.
     """
     require_plugins(cell)
     settings = _with_encoder_files(with_passwords(cell.settings, cell.path.parent), cell.path.parent)
@@ -149,10 +148,7 @@ def encoders_with_speed(settings: CellSettings) -> EncoderSettings:
 async def open_devices(settings: CellSettings, folder: Path | None = None) -> AsyncIterator[Connected]:
     """Connect the cell's devices; they are closed at the end of this context.
 
-    ``folder`` has the cell file; the path of its stop file is relative to it.
-
-    Raises:
-        HexacellError: one or more devices do not answer as they must.
+    ``folder`` has the cell file; the path of its stop file is relative to it. Raises ``HexacellError``.
     """
     trace = WireTrace()
     links = SharedSerialPorts(trace=trace)

@@ -189,11 +189,9 @@ class CellDraft:
         return ""
 
     def write(self) -> None:
-        """Write the file.
+        """Write the file; after a ``FileError``, or ``SeveralErrors``, there is no new one.
 
-        Raises:
-            FileError: it is there, cannot be written, or a pose is out of reach; then there is no new file.
-            SeveralErrors: more than one is.
+        The file is there already, it cannot be written, or a pose is out of reach.
         """
         if self.path.exists():
             raise FileError("is there by now", subject=self.path, action="Remove it, or name another")

@@ -59,10 +59,8 @@ def require_sound(
     """The state after a recorded history of a run of a cell, which ``journal`` keeps.
 
     If it ``follows_plan`` the whole run is used, and the cell file is as it was; otherwise only numbers are
-    used, and the points of the cell file may be others by now.
-
-    Raises:
-        FileError: an event cannot be of such a run; with its line.
+    used, and the points of the cell file may be others by now. Raises ``FileError``, with the line, if an
+    event cannot be of such a run.
     """
     state = RunState()
     for line, event in enumerate(history, start=1):

@@ -149,13 +149,9 @@ def reason_to_keep(run: PastRun) -> KeptFor | None:
 
 
 def delete_runs(cell: Cell, runs: Sequence[PastRun]) -> None:
-    """Delete the folders of runs, while nothing else uses the cell.
+    """Delete the folders of runs, while nothing else uses the cell; raises ``CellBusy`` or ``FileError``.
 
     What has changed since the runs were listed is looked at again: one that must stay does.
-
-    Raises:
-        CellBusy: a run is going on.
-        FileError: a folder cannot be deleted.
     """
     with held_config(*cell.config_paths):
         now = {run.name: run for run in past_runs(cell)}

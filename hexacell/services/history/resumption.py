@@ -68,9 +68,8 @@ def _interrupted_at(run: RunFolder) -> datetime | None:
 def require_own_run(cell: Cell, folder: RunFolder, state: RunState) -> None:
     """Check a run folder before its run is resumed; ``state`` is by its journal.
 
-    Raises:
-        FileError: a file in it is a link, names another config, or has a geometry or a pose that is not of
-            this robot.
+    Raises ``FileError`` if a file in it is a link, names another config, or has a geometry or a pose that
+    is not of this robot.
     """
     folders = (folder.path, folder.path / PROVISIONAL_FOLDER)
     for path in folders:

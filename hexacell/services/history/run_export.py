@@ -23,11 +23,8 @@ _CONFIG = re.compile(f"({BEFORE}|{AFTER})(-[0-9]+)?")
 def export_run(run: Path, target: Path) -> tuple[str, ...]:
     """Copy a run folder to ``target`` without its secrets; gives the names of the files in it.
 
-    Only files that belong to a run are copied. The copy can be replayed.
-
-    Raises:
-        UsageError: ``target`` is not empty.
-        FileError: there is no run, its journal is damaged, or the copy cannot be written.
+    Only files that belong to a run are copied. The copy can be replayed. Raises ``UsageError`` if
+    ``target`` is not empty, ``FileError`` if there is no whole journal, or the copy cannot be written.
     """
     folder = RunFolder(run)
     read_entries(folder.journal)

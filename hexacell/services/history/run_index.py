@@ -162,13 +162,10 @@ class RunIndex:
         runs: Iterable[str] | None = None,
         context: str = "",
     ) -> dict[str, Document]:
-        """The documents of all runs, or of some, by name; runs without one are left out.
+        """The documents of all runs, or of some, by name, of those that have one; raises ``FileError``.
 
         ``read`` derives a document from its folder, or None. ``context`` is a word for
         what it depends on beside the folder: documents of another one are derived again.
-
-        Raises:
-            FileError: the folder of the runs cannot be read.
         """
         stamps = {name: f"{stamp} {context}" for name, stamp in folder_stamps(self._folder).items()}
         wanted = {name: stamps[name] for name in (stamps if runs is None else runs) if name in stamps}

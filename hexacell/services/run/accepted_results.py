@@ -25,10 +25,7 @@ from procedures.run.state import RunState
 def last_accepted_result(cell: Cell) -> AcceptedResult | None:
     """The newest accepted result whose config is the one that the controller has now, byte for byte.
 
-    Runs whose files cannot be read are left out.
-
-    Raises:
-        FileError: the controller's config cannot be read.
+    Runs whose files cannot be read are left out; an unreadable config is a ``FileError``.
     """
     written = fingerprint(*cell.config_paths)
     found = {run: one for run in run_folders(cell) if (one := _accepted(cell, run, written)) is not None}

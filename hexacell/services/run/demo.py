@@ -40,9 +40,7 @@ def require_simulation(cell: Cell) -> Cell:
 def served_cell(cell: Cell) -> Iterator[str]:
     """Serve a simulated cell within this context; gives a cell file that reaches it, as text.
 
-    Raises:
-        UsageError: it is a real cell.
-        HexacellError: the simulation cannot start.
+    Raises ``UsageError`` for a real cell, ``HexacellError`` if the simulation cannot start.
     """
     require_simulation(cell)
     with device_addresses(cell, other_processes=True) as settings:
@@ -68,10 +66,8 @@ def _absolute_files(cell: Cell) -> Iterator[FurtherFileSettings]:
 def prepare_demo(folder: Path, config_name: str) -> RunRequest:
     """Copy a bundled cell into ``folder`` and request a calibration of it.
 
-    Raises:
-        UsageError: there is no such cell, or it has no simulation.
-        FileError: the folder is not empty and not an earlier demo's.
-        CellBusy: a demo is running in it.
+    Raises ``UsageError`` if there is no such simulated cell, ``FileError`` if the folder is neither empty
+    nor an earlier demo's, ``CellBusy`` if a demo is running in it.
     """
     bundled = require_simulation(load_cell(bundled_config(config_name)))
     cell = load_cell(_copy_cell(bundled.path, folder))

@@ -20,15 +20,10 @@ CHUNK = 1 << 16
 
 
 class EventStream:
-    """Copies journals, each from its beginning, to a file or a pipe.
+    """Copies journals, each from its beginning, to a pipe or a file, which is replaced.
 
-    Args:
-        target: is replaced, if it is a file.
-        warn: is called once if the target takes no more.
-
-    Raises:
-        UsageError: nobody reads the pipe.
-        FileError: the target cannot be written.
+    ``warn`` is called once if the target takes no more. Raises ``UsageError`` for a pipe that nobody reads,
+    ``FileError`` for a target that cannot be written.
     """
 
     def __init__(self, target: Path, warn: Callable[[str], None]) -> None:

@@ -84,9 +84,8 @@ def resolved_address(
 ) -> NoticeAddress:
     """The address of a recipient; ``folder`` has the cell file, ``cell`` is the cell's name.
 
-    Raises:
-        FileError: its password file cannot be read, or others can read or change it.
-        UsageError: there is no url anywhere, or a variable cannot be one.
+    Raises ``FileError`` if its password file cannot be read, or others can read or change it;
+    ``UsageError`` if there is no url anywhere, or a variable cannot be one.
     """
     file = None if settings.password_file is None else folder / settings.password_file
     variables = {part: variable(settings.name, part) for part in PARTS}
@@ -189,12 +188,11 @@ def post_to_webhook(address: NoticeAddress, notice: Notice, timeout_s: float) ->
 
 def _opener(address: NoticeAddress) -> urllib.request.OpenerDirector:
     """Follows no redirection: another address must not get the password of this one."""
-    trusted = None if address.ca_file is None else str(address.ca_file)
     opener = urllib.request.OpenerDirector()
     for handler in (
         urllib.request.ProxyHandler(),
         urllib.request.HTTPHandler(),
-        urllib.request.HTTPSHandler(context=ssl.create_default_context(cafile=trusted)),
+        urllib.request.HTTPSHandler(context=ssl.create_default_context(cafile=address.ca_file)),
         urllib.request.HTTPErrorProcessor(),
         urllib.request.HTTPDefaultErrorHandler(),
     ):
@@ -276,9 +274,7 @@ def _client(address: NoticeAddress, timeout_s: float) -> tuple[Client, threading
         client.username_pw_set(address.user, address.password)
     if urlsplit(address.url).scheme == "mqtts":
         try:
-            client.tls_set_context(
-                ssl.create_default_context(cafile=None if address.ca_file is None else str(address.ca_file))
-            )
+            client.tls_set_context(ssl.create_default_context(cafile=address.ca_file))
         except OSError as error:
             raise NoticeUndelivered(f"{address.ca_file}: {error.strerror or error}") from error
     return client, answered, answer

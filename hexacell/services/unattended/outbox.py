@@ -100,11 +100,10 @@ class NoticeOutbox:
         except OSError as error:
             raise atomic_files.os_error_to_file_error("cannot be read", self._folder, error) from error
         try:
-            try:
+            is_ours = False
+            with suppress(BlockingIOError):
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 is_ours = True
-            except BlockingIOError:
-                is_ours = False
             yield is_ours
         finally:
             os.close(descriptor)
@@ -130,13 +129,7 @@ OTHER_PROCESS = "another process is sending at this moment"
 
 @dataclass(frozen=True, slots=True)
 class Delivery:
-    """What became of the notices to one recipient.
-
-    Attributes:
-        sent: how many were taken.
-        wait: how many still wait.
-        problem: why some wait; None if all were taken.
-    """
+    """How many notices one recipient took, how many still wait, and why; no problem if all were taken."""
 
     name: str
     sent: int

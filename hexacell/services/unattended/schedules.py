@@ -40,11 +40,9 @@ MOST_RETRIES = 3
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """The units of one cell.
+    """The units of one cell, and what systemd says is wrong with them.
 
-    Attributes:
-        is_of_system: whether they run without a user being logged in.
-        complaints: what systemd says is wrong with them.
+    ``is_of_system`` is whether they run without a user being logged in.
     """
 
     unit: str
@@ -54,13 +52,10 @@ class Schedule:
 
 
 def scheduled_run(cell: Cell, daily: str, mode: str, metrics: Path | None) -> ScheduledRun:
-    """What is to be started, each day at the time ``daily``.
+    """What is to be started, each day at the time ``daily``; raises ``UsageError``.
 
     What the cell file says of window and longest duration the run itself keeps: a service must leave it the
     time for that, and does not try again what was tried for a whole window.
-
-    Raises:
-        UsageError: it cannot run without a person, or in a day, or something given makes no sense.
     """
     hour, minute = time_of_day(daily)
     stated = cell.settings.unattended
@@ -94,11 +89,8 @@ def scheduled_run(cell: Cell, daily: str, mode: str, metrics: Path | None) -> Sc
 def write_schedule(run: ScheduledRun, folder: Path | None) -> Schedule:
     """Write the units, into a folder or where this user's units are.
 
-    Those that the cell had under an earlier name are removed: a cell has one schedule.
-
-    Raises:
-        UsageError: another cell's units have this name.
-        FileError: they cannot be written.
+    Those that the cell had under an earlier name are removed: a cell has one schedule. Raises
+    ``UsageError`` if another cell's units have this name, or ``FileError``.
     """
     place, is_of_system = _place(folder)
     service, timer = place / f"{run.unit}.service", place / f"{run.unit}.timer"

@@ -21,9 +21,10 @@ from hexacell.runs.run_folder import RunFolder
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.journal.journal import RESTORE, now, read_journal
 from procedures.resources.controller_config import holds_provisional
-from procedures.run.questions import Operator, PendingChange, Question, ask_approval
+from procedures.run.questions import Operator, Question, ask_approval
 from procedures.run.state import RunState, fold
 from procedures.steps import events
+from procedures.steps.commit import pending_change
 
 COMMAND = "the command"
 """Who approves what needs no person: who typed ``apply``."""
@@ -61,9 +62,8 @@ class Proposal:
 class AppliedProposal:
     """A proposal that the config has now.
 
-    Attributes:
-        by: who had it written, empty if it was there already.
-        unrecorded: why the history has no record of it, in a sentence; empty if it has.
+    ``by`` is who had it written, empty if it was there already; ``unrecorded`` why the history has no
+    record of it, in a sentence, empty if it has.
     """
 
     proposal: Proposal
@@ -72,12 +72,7 @@ class AppliedProposal:
 
 
 def read_proposal(folder: RunFolder) -> Proposal:
-    """The proposal of a run.
-
-    Raises:
-        UsageError: the run proposed nothing.
-        FileError: its files cannot be read, or do not belong together.
-    """
+    """The proposal of a run; raises ``UsageError`` without one, ``FileError`` for files that do not fit."""
     state = fold(read_journal(folder.journal))
     if state.started is None or state.proposed is None or not folder.proposal.exists():
         raise UsageError(
@@ -101,11 +96,7 @@ def read_proposal(folder: RunFolder) -> Proposal:
 
 def approval_question(proposal: Proposal) -> Question:
     """What a person is asked before it is written, with the gates that may refuse it."""
-    state = proposal.state
-    improvement = state.identified.improvement if state.identified else None
-    change, moved = proposal.change, proposal.displacement
-    corrections, terms = change.changed_corrections, state.found_terms
-    pending = PendingChange(proposal.gates, change.diff, moved, improvement, corrections, terms)
+    pending = pending_change(proposal.state, proposal.change, proposal.gates)
     return ask_approval(pending, cell=proposal.cell)
 
 

@@ -9,6 +9,7 @@ from hexacell.services.history.reported_run import ReportedRun
 from hexacell.text.measured_noise import measured_noise_sentences, reversal_sentence
 from hexacell.text.report import results, statement
 from hexacell.text.report.pages import Chapter, Facts, Paragraph, Report, Table, Tone
+from procedures.run.readings import temperatures_shown
 
 TITLES = {
     "optimise": "Calibration report",
@@ -89,11 +90,8 @@ def traceability_chapter(run: ReportedRun) -> Chapter:
     for one in instruments(run):
         number, due = NOT_STATED, ""
         if (stated := one.certificate) is not None:
-            number = (
-                stated.number
-                if stated.expanded_um is None
-                else f"{stated.number} (U {stated.expanded_um:g} um)"
-            )
+            number = stated.number
+            number += "" if stated.expanded_um is None else f" (U {stated.expanded_um:g} um)"
             due = f"{stated.due or ''}{': EXPIRED' if stated.has_expired(day) else ''}"
         rows.append((one.device.name, one.device.description, one.serial_number or NOT_STATED, number, due))
     expired = ", ".join(run.settings.expired_on(day))
@@ -126,12 +124,8 @@ def authorisation_chapter(run: ReportedRun) -> Chapter:
 
 def temperature_ranges(run: ReportedRun) -> dict[str, tuple[float, float]]:
     """The lowest and highest temperature that each thermometer showed with the records, deg C."""
-    shown: dict[str, list[float]] = {}
-    for measured in run.state.sets.values():
-        for sample in measured.samples:
-            for one in sample.reading.temperatures:
-                if one.celsius is not None:
-                    shown.setdefault(one.name, []).append(one.celsius)
+    samples = (sample for measured in run.state.sets.values() for sample in measured.samples)
+    shown = temperatures_shown(sample.reading for sample in samples)
     return {name: (min(values), max(values)) for name, values in shown.items()}
 
 

@@ -155,19 +155,15 @@ def _found_and_left_rows(run: ReportedRun) -> Iterator[tuple[str, str, str]]:
     identified, accuracy = run.state.identified, run.state.accuracy
     if identified is not None and identified.improvement is not None:
         after = None if accuracy is None else accuracy.position.value
-        yield _before_after(
-            "largest position error at the task poses", identified.improvement.now_mm, after
-        )
+        name = "largest position error at the task poses"
+        yield _before_after(name, identified.improvement.now_mm, after)
 
 
 def _before_after(name: str, before_mm: float, after_mm: float | None) -> tuple[str, str, str]:
     """A row of a length before and after, in the unit of the smaller one."""
     unit = unit_of(before_mm if after_mm is None else after_mm)
-    return (
-        f"{name}, {unit.name}",
-        unit.number(before_mm),
-        "-" if after_mm is None else unit.number(after_mm),
-    )
+    left = "-" if after_mm is None else unit.number(after_mm)
+    return f"{name}, {unit.name}", unit.number(before_mm), left
 
 
 def _left(run: ReportedRun) -> str:

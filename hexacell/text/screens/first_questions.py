@@ -49,9 +49,8 @@ QUESTIONS = {
 class FirstCellAssistant:
     """Makes the cell file at a path, from a draft where something is known already.
 
-    Attributes:
-        is_done: whether the file is there.
-        problem: why the last answer could not be taken; empty if it could.
+    ``is_done`` is whether it is there, ``problem`` why the last answer could not be taken; empty if it
+    could.
     """
 
     def __init__(self, path: Path, draft: CellDraft | None = None) -> None:

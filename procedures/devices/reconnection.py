@@ -76,10 +76,8 @@ def _concerns(mounted: MountedGauge, errors: Sequence[HexacellError]) -> bool:
 
 def _has_failed(error: HexacellError, device: str) -> bool:
     """Whether a guard tripped because a device did not answer, or its driver has no better word for it."""
-    if type(error) is DeviceError and error.subject == device:
-        return True
     is_stale = isinstance(error, GuardTripped) and error.trip.guard is Guard.STALE
-    return is_stale and error.subject == device
+    return error.subject == device and (is_stale or type(error) is DeviceError)
 
 
 def _words(device: DeviceIdentity) -> str:

@@ -160,9 +160,8 @@ def _dependent_result(phase: Phase, state: RunState) -> str | None:
 class QuestionBroker:
     """Passes questions on to an operator; the first answer counts, its own or one given to :meth:`answer`.
 
-    Attributes:
-        open: the question that waits for an answer, if one does.
-        watchers: called with every question that is opened, and with None when it is closed.
+    ``open`` is the question that waits for an answer, if one does; ``watchers`` are called with every
+    question that is opened, and with None when it is closed.
     """
 
     def __init__(self, operator: Operator) -> None:

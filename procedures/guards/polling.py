@@ -86,13 +86,8 @@ class WatchedController:
     """The controller during one action: its status, and since when its heartbeat has stood.
 
     A controller that works reports something else whenever the joints move. One whose server answers from
-    what it knew last is frozen: the encoders show another position, and its heartbeat stands.
-
-    Args:
-        devices: the controller, and the encoders whose samples the guards have.
-        clock: the cell's.
-        moved: by so much a joint has moved, in its unit.
-        patience_s: for so long the heartbeat may lag behind the joints, s of real time.
+    what it knew last is frozen: the encoders show that a joint ``moved`` by so much, in its unit, and its
+    heartbeat stands. For ``patience_s``, s of real time, that may lag behind the joints.
     """
 
     def __init__(self, devices: Devices, clock: CellClock, moved: float, patience_s: float) -> None:

@@ -18,11 +18,12 @@ the run began with, or the one that the run itself wrote and has not reverted.
 """
 
 import logging
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import zip_longest
 from pathlib import Path
+from typing import TypeVar
 
 from drivers.errors import StartupNotPermitted
 from drivers.interfaces import Controller, StartupAction, StartupActions
@@ -40,6 +41,8 @@ from procedures.run.cancellation import in_thread
 from procedures.run.questions import YES, Operator, ask_startup
 from procedures.run.state import RunState
 
+Result = TypeVar("Result")
+
 _RESETS = frozenset({StartupAction.RESET_INITIAL_ESTOP, StartupAction.RESET_ESTOP})
 
 
@@ -53,9 +56,8 @@ class Startup:
     and homing need the cell file's word or a person's. A reload command may restart the controller, which
     is then in the emergency stop that it starts in: the cell file's word counts for that as well.
 
-    Attributes:
-        stated: what the cell file permits.
-        may_have_begun: an order that could have ended its first emergency stop was given.
+    The cell file's word is ``stated``; ``may_have_begun`` is whether an order was given that could have
+    ended its first emergency stop.
     """
 
     controller: Controller
@@ -94,14 +96,12 @@ class Startup:
 
     async def _prepare(self, permitted: StartupActions) -> None:
         async def order() -> None:
+            before, self.may_have_begun = self.may_have_begun, True
             try:
                 await self.controller.prepare(permitted)
             except StartupNotPermitted:
+                self.may_have_begun = before
                 raise
-            except BaseException:
-                self.may_have_begun = True
-                raise
-            self.may_have_begun = True
 
         await self.guards.prepare(order)
 
@@ -166,7 +166,7 @@ class ConfigChanges:
             await self.startup.reload()
         except HexacellError as error:
             undoing = self.cause(_UNDOES[cause.kind], f"the controller did not take it: {error}")
-            await self._roll_back(receipt, undoing)
+            await self._recorded(undoing, lambda: rollback(receipt))
             has_old_geometry = False
             with suppress(HexacellError):
                 await self.startup.controller.reload(self.startup.stated)
@@ -179,37 +179,30 @@ class ConfigChanges:
 
     async def write(self, change: ConfigChange, backup: Path, cause: WriteCause) -> Receipt:
         """Write a change; the controller is not made to read it yet."""
-
-        def written() -> Receipt:
-            with self._recorded(cause):
-                return commit(change, backup)
-
-        return await in_thread(written)
+        return await self._recorded(cause, lambda: commit(change, backup))
 
     async def restore(self, backup: Path, cause: WriteCause) -> None:
         """Restore what a backup keeps; the controller is not made to read it yet."""
-        await self._roll_back(Receipt.of(backup), cause)
+        receipt = Receipt.of(backup)
+        await self._recorded(cause, lambda: rollback(receipt))
 
     def require_begun_with(self, state: RunState) -> None:
         """Make sure that the config is the one that the run began with; raises ``FileError``."""
         if state.started and fingerprint(*self.cell.config_paths) != state.started.config_sha256:
             raise _edited(self.cell.config_path)
 
-    async def _roll_back(self, receipt: Receipt, cause: WriteCause) -> None:
-        def restored() -> None:
-            with self._recorded(cause):
-                rollback(receipt)
+    async def _recorded(self, cause: WriteCause, write: Callable[[], Result]) -> Result:
+        """Write, and record it; without a record the run goes on, warned: its journal has the write."""
+        layout, paths = ConfigLayout.of(self.cell.settings), self.cell.config_paths
 
-        await in_thread(restored)
+        def written() -> Result:
+            with recorded_write(self.folder.siblings, paths, layout, cause) as recording:
+                result = write()
+            if recording.problem:
+                _log.warning("%s", recording.problem)
+            return result
 
-    @contextmanager
-    def _recorded(self, cause: WriteCause) -> Iterator[None]:
-        """Record a write; where that fails the run goes on, with a warning: its journal has the write."""
-        layout = ConfigLayout.of(self.cell.settings)
-        with recorded_write(self.folder.siblings, self.cell.config_paths, layout, cause) as recording:
-            yield
-        if recording.problem:
-            _log.warning("%s", recording.problem)
+        return await in_thread(written)
 
 
 def holds_provisional(folder: RunFolder, config: tuple[Path, ...]) -> bool:

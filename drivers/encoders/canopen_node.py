@@ -136,9 +136,8 @@ class CountingSdoClient(SdoClient):
     Failures are those of :meth:`EncoderBus.check`, and a ``canopen.SdoError`` where there is no valid
     response or it is an abort.
 
-    Attributes:
-        has_surplus_response: there were more responses than requests: two devices share the node id.
-        has_responded: there was a response.
+    ``has_responded``: there was a response; ``has_surplus_response``: there were more than requests, so two
+    devices share the node id.
     """
 
     RESPONSE_TIMEOUT = 0.0  # read_response waits before canopen does

@@ -103,11 +103,8 @@ class SimulatedCell(ServedGroup):
     """The cell described by ``[simulation]`` of a cell file; serves until it is closed.
 
     ``faults`` injects faults at once, ``schedule`` at a later time. ``other_processes``: whether the
-    encoders must be reachable from other processes.
-
-    Raises:
-        FileError: the controller's config cannot be read.
-        ReachError: the first point of the cell is out of reach by its config or its true geometry.
+    encoders must be reachable from other processes. Raises ``FileError`` if the controller's config cannot
+    be read, ``ReachError`` if the first point is out of reach by the config or by the true geometry.
     """
 
     def __init__(

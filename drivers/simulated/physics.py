@@ -172,9 +172,7 @@ class RobotPhysics:
 
     It starts where a controller with the geometry ``commanding`` puts the joints for ``home``. The joints
     go where the encoders show what is commanded. ``fixture`` has the seats of a length check, if any.
-
-    Raises:
-        ReachError: ``home`` is out of reach of that geometry or of the true one.
+    Raises ``ReachError`` if ``home`` is out of reach of that geometry or of the true one.
     """
 
     def __init__(

@@ -35,19 +35,12 @@ def instrument_class(protocol: str) -> InstrumentFactory:
 class SimulatedGaugeBank(ServedGroup):
     """The gauges of a simulated cell; serves until it is closed.
 
-    Args:
-        gauges: their settings in the cell file.
-        plungers: by name of a gauge: the position of its plunger, mm from the middle of the travel, in the
-            instrument's own direction, with noise; called from the threads of the lines.
-        settings: of the simulation.
-        clock: the cell's clock, by which answers take their time.
-        instruments: others than those that are announced, by protocol.
+    ``plungers`` give, by name of a gauge, the position of its plunger, mm from the middle of the travel, in
+    the instrument's own direction, with noise; called from the threads of the lines. ``instruments`` are
+    others than those that are announced, by protocol; a protocol without any is a ``FileError``.
 
     Attributes:
         gauges: the settings with the ports on which the gauges are served.
-
-    Raises:
-        FileError: a gauge's protocol has no simulated device.
     """
 
     def __init__(

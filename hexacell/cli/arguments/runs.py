@@ -141,21 +141,17 @@ def _studies(commands: Any) -> None:  # noqa: ANN401
     parser = add_parser(commands, "study", "repeat what was published of the method, on simulated robots")
     studies = parser.add_subparsers(title="studies", metavar="STUDY", required=True)
     for name, summary, drawn in STUDIES:
-        _add_study(studies, name, summary, drawn)
-
-
-def _add_study(studies: Any, name: str, summary: str, drawn: str) -> None:  # noqa: ANN401
-    parser = add_command(studies, name, summary, target="study.main")
-    parser.set_defaults(study=name)
-    add_value(parser, "--draws", "N", drawn, whole_number(1), 20)
-    workers = parser.add_mutually_exclusive_group()
-    words = "at a time (default: one for each processor)"
-    add_value(workers, "--processes", "N", words, whole_number(1))
-    words = "of a Dask cluster, tcp://HOST:PORT, instead of processes"
-    add_value(workers, "--scheduler", "ADDRESS", words)
-    words = "keeps each result, so that a study can be interrupted, and gets a picture"
-    add_value(parser, "--folder", "FOLDER", words, Path, Path("hexacell-study"))
-    parser.add_json()
+        study = add_command(studies, name, summary, target="study.main")
+        study.set_defaults(study=name)
+        add_value(study, "--draws", "N", drawn, whole_number(1), 20)
+        workers = study.add_mutually_exclusive_group()
+        words = "at a time (default: one for each processor)"
+        add_value(workers, "--processes", "N", words, whole_number(1))
+        words = "of a Dask cluster, tcp://HOST:PORT, instead of processes"
+        add_value(workers, "--scheduler", "ADDRESS", words)
+        words = "keeps each result, so that a study can be interrupted, and gets a picture"
+        add_value(study, "--folder", "FOLDER", words, Path, Path("hexacell-study"))
+        study.add_json()
 
 
 RUN_COMMANDS = (_demo, _run, _tui, _length, _preflight, _simulate, _host, _next, _fit, _replay)

@@ -7,6 +7,7 @@ to again.
 
 from collections.abc import Iterator
 from datetime import datetime
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -160,12 +161,9 @@ def _poses_to_come(state: RunState) -> Iterator[SixNumbers]:
     for measured in state.sets.values():
         yield from (sample.pose for sample in measured.samples)
         yield from (pose for _, pose in measured.again)
-    if state.identified is not None:
-        for at_point in (*state.identified.held_out, *state.identified.held_out_after):
-            yield from at_point
-    if state.confirmation is not None:
-        for at_point in state.confirmation.poses:
-            yield from at_point
+    found, confirmation = state.identified, state.confirmation
+    held_out = () if found is None else (*found.held_out, *found.held_out_after)
+    yield from chain(*held_out, *(() if confirmation is None else confirmation.poses))
 
 
 def _commanding(robot: Robot, state: RunState) -> Iterator[Geometry]:

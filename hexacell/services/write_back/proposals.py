@@ -180,12 +180,10 @@ def _require_unedited(proposal: Proposal) -> None:
             subject=change.path,
             action="Resume that run, which takes it back",
         )
+    stated = (change.before, change.corrections_before), (change.after, change.corrections_after)
     before, after = (
         ControllerGeometry(Geometry.of(proposal.parameters, geometry), (), corrections=corrections)
-        for geometry, corrections in (
-            (change.before, change.corrections_before),
-            (change.after, change.corrections_after),
-        )
+        for geometry, corrections in stated
     )
     versions = compare_versions(
         change.paths, proposal.layout, (before, change.before_contents), (after, change.after_contents)

@@ -13,6 +13,7 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.run_process.client import connect_to_run
 from hexacell.run_process.run_socket import socket_path
+from tests.signals import terminal_signals
 from tests.waiting import wait_until
 
 NAME = "simulated-hexaglide"
@@ -31,7 +32,9 @@ def served_in(folder: Path) -> Iterator[Path]:
         shutil.copy(bundled_config(NAME).with_name(name), folder)
     path = folder / "served.toml"
     command = [sys.executable, "-m", "hexacell", "simulate", f"{NAME}.toml", "--output", str(path)]
-    with subprocess.Popen(command, cwd=folder, stderr=subprocess.DEVNULL) as process:
+    with terminal_signals():
+        process = subprocess.Popen(command, cwd=folder, stderr=subprocess.DEVNULL)
+    with process:
         try:
             wait_until(path.exists)
             yield path

@@ -141,6 +141,21 @@ def test_significantly_worse_is_a_fail_that_nobody_is_offered(cell, result, held
     assert (verified.verdict, verified.is_worse, verified.is_offered) == (Verdict.FAIL, True, False)
 
 
+@pytest.mark.parametrize("is_calibrated", [False, True])
+def test_where_deviations_only_scatter_the_records_say_whether_the_geometry_is_better(
+    cell, visit, held_out, is_calibrated
+):
+    settings = changed(cell.settings, {"noise.stops": 0.3})
+    robot = robot_of(replace(cell, settings=settings))
+    found = identify(robot.problem(visit(seed=2).measured(NOISE_MM, 1)))
+    written = as_written(settings, robot, found.geometry).geometry
+    if is_calibrated:
+        robot = robot.with_controller(written)
+    verified = verify(settings, robot.with_controller(written), found, held_out(before=FAR, after=FAR))
+    assert (verified.verdict, verified.is_worse) == (Verdict.NOT_EVALUATED, False)
+    assert verified.is_kept != is_calibrated
+
+
 @pytest.mark.parametrize("is_worse", [False, True])
 def test_zeros_that_may_not_run_are_named_where_the_controller_reads_the_encoders(
     cell, result, held_out, bent, is_worse

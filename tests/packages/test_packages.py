@@ -1,7 +1,5 @@
 """Packages beside hexacell add a gauge, encoders, a mechanism: their own suites pass, cells use them."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """Visits of one pose: what encoders see is no error, what nobody stated is found and named."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What encoders say of the ball holds for every robot within the tolerances, as surely as stated."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Gauges judged by what they showed after small known moves, on robots drawn within their tolerances."""
 
-from __future__ import annotations
-
 from itertools import permutations, product
 
 import numpy as np

@@ -1,7 +1,5 @@
 """From readings at the first reference to the noise of records: what counts, and what averaging gains."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

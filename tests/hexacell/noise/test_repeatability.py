@@ -1,7 +1,5 @@
 """Repeatability: the scatter over visits of the same pose."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

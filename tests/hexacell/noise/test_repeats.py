@@ -1,7 +1,5 @@
 """Repeated readings correct the noise that is stated only where they contradict it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Noise of readings at rest: what is drawn is found, and what is no noise is not taken for it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.stats import chi2, kstest

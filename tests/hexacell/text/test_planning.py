@@ -12,26 +12,8 @@ from hexacell.dry_run.campaign import DryRunResult
 from hexacell.errors import ExitCode
 from hexacell.measurements.csv_file import write_measurements
 from hexacell.measurements.records import MeasurementSet
-from hexacell.noise.measured_noise import AveragingForecast
 from hexacell.services.offline import PlanTrial
 from hexacell.text.planning import forecast_text, plan_trial_lines, run_forecast_line
-
-FORECAST = Forecast(now_mm=0.31, next_mm=0.29, end_mm=0.06, records=24, minutes=12.4)
-
-
-def test_a_forecast_says_what_records_gain_and_u_where_the_effects_are_known():
-    text = forecast_text(FORECAST)
-    assert text.startswith("Predicted error at the worst task pose 0.310 mm (one sigma);")
-    assert text.endswith("continuing gains 0.250 mm in 24 records, about 12 minutes.")
-    done = FORECAST.model_copy(update={"now_mm": 0.06, "records": 0})
-    assert forecast_text(done).endswith("0.060 mm (one sigma).")
-    assert "none of the task poses" in forecast_text(None)
-    known = FORECAST.model_copy(update={"systematic_mm": 0.08})
-    assert known.expanded_mm(0.06) == pytest.approx(0.2)
-    assert FORECAST.expanded_mm(0.06) is None
-    text = forecast_text(known)
-    assert "0.310 mm (one sigma), U 0.640 mm with the systematic effects;" in text
-    assert text.endswith("continuing gains 0.250 mm, U 0.200 mm then in 24 records, about 12 minutes.")
 
 
 def test_errors_of_micrometres_are_in_um():
@@ -55,19 +37,6 @@ def lines(target_mm=None, **changes):
     return [
         *plan_trial_lines(PlanTrial(DryRunResult(**(values | changes)), {1: 0.0, 2: 0.0625}, target_mm))
     ]
-
-
-def test_the_part_of_the_encoders_is_told():
-    forecasts = tuple(
-        AveragingForecast(windows=windows, error_mm=0.2 / windows**0.5, minutes=0.5 * windows)
-        for windows in (1, 2, 4)
-    )
-    trial = PlanTrial(DryRunResult(2, 2, 5, 55, 0, 0.02, 40.0), {}, None, forecasts, 0.17)
-    assert [*plan_trial_lines(trial)][-1] == (
-        "The noise of the encoders makes about 0.170 of 0.200 mm (one sigma). As far as noise differs "
-        "from reading to reading, which a run measures, 4 windows of readings a record give 0.100 mm for "
-        "2 minutes more."
-    )
 
 
 def test_what_a_plan_may_miss_is_reported():

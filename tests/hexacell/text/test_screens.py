@@ -3,7 +3,7 @@
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-from drivers.interfaces import ControllerStatus, EncoderSample
+from drivers.interfaces import EncoderSample
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.checks.check_result import CheckResult, ParameterChange
 from hexacell.kinematics.pose import Pose
@@ -17,16 +17,13 @@ from hexacell.run_process.messages import (
     QuestionChanged,
     RunDescribed,
     Shown,
-    StatusChanged,
 )
 from hexacell.text.parameters import parameter_table, rows_of_run
 from hexacell.text.screens.live import device_lines, mounting_advice
 from hexacell.text.screens.measuring import fault_view, guidance, record_lines
 from hexacell.text.screens.reviewing import review_texts
 from hexacell.text.screens.run_picture import RunPicture, Setback, picture_after
-from hexacell.text.screens.views import Urgency
 from hexacell.verdict.decision import Verdict
-from procedures.engine.command_loop import Status
 from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import ask_placement
 from procedures.run.state import fold
@@ -82,35 +79,6 @@ def test_a_device_that_is_silent_gets_older_by_itself() -> None:
     lines = device_lines(snapshot, later_s=7.0)
     assert "7.1 s" in lines[0][0]
     assert lines[1][0].endswith("mm, 7.1 s ago")
-
-
-def test_what_is_urgent_is_said_in_words_too() -> None:
-    snapshot = LiveSnapshot(
-        gauges=(gauge(problem="gauge x: it answers in inch"),),
-        encoders=Shown(problem="leg 3 is silent"),
-        controller=Shown(value=ControllerStatus(True, False, ("drive 3",)), age_s=0.1),
-        stop_reason="the door is open",
-    )
-    assert device_lines(snapshot) == [
-        ("x   NO READING for 0.1 s: it answers in inch", Urgency.ALARM),
-        ("encoders   leg 3 is silent", Urgency.ALARM),
-        ("controller EMERGENCY STOP; drive 3", Urgency.ALARM),
-        ("stop line  NO MOTION: the door is open", Urgency.ALARM),
-    ]
-
-
-def test_guidance_says_what_happens_now() -> None:
-    refused = events.CommandRejected(command="Undo", reason="there is no record")
-    failed = HostFailed(problem="its disk is full", exit_code=3)
-    said: list[tuple[tuple[HostMessage, ...], str]] = [
-        ((StatusChanged(status=Status.PAUSED),), "paused: the robot stands still"),
-        ((StatusChanged(status=Status.PAUSING),), "choosing the next pose, then it pauses"),
-        ((recorded(refused),), "Undo was refused: there is no record"),
-        ((failed, StatusChanged(status=Status.ENDED)), "ended early: its disk is full"),
-    ]
-    for messages, now in said:
-        assert guidance(pictured(described(), *messages), None)["Now"] == now
-    assert guidance(RunPicture(), None)["Now"] == "no run is being measured here"
 
 
 def test_the_time_that_is_left_follows_from_the_pace() -> None:
@@ -199,15 +167,3 @@ def test_every_verdict_is_said_in_words_with_its_scope() -> None:
         shown = review_texts(pictured(described(), recorded(judged)), None)
         assert shown["verdict"].lower().startswith(f"{verdict.value}: ")
         assert shown["scope"] == "what came of it"
-
-
-def test_the_approval_says_how_it_stands() -> None:
-    failed = events.ResultValidated(verdict=Verdict.FAIL, line="")
-    stands: list[tuple[tuple[events.Event, ...], str]] = [
-        ((), "Approving is not possible yet: the geometry is not identified."),
-        ((failed, events.RolledBack()), "The old config was restored."),
-        ((events.Committed(approved_by="ada"),), "Written to the controller, approved by ada."),
-    ]
-    for told, approval in stands:
-        picture = pictured(described(), *map(recorded, told))
-        assert review_texts(picture, None)["approval"] == approval

@@ -1,7 +1,5 @@
 """The gates before a geometry may enter a controller, and the verdict on the held-out poses after it."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

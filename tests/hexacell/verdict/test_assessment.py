@@ -1,7 +1,5 @@
 """The assessment of an identification, its findings and its JSON document."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """A length check within the verification of a result, on the bundled cell with a fixture."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

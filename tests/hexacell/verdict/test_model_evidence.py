@@ -1,7 +1,5 @@
 """A narrow failure of a test of the model, confirmed by new records or not."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Evidence, accuracy and decision on simulated results of the bundled cell."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a machine with scaled encoders gives in the two seats of a fixture, by leg equations alone."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

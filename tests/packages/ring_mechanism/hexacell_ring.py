@@ -16,8 +16,6 @@ The rail fixes the base frame but for a turn about its axis and a shift along it
 the platform frame, five of 42 numbers are free to choose, and 37 are left.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hexacell.kinematics.geometry import Geometries, Geometry

@@ -1,7 +1,5 @@
 """Gauges whose mounts drift: the run says so once, and the way of their zero is data."""
 
-from __future__ import annotations
-
 import asyncio
 from dataclasses import replace
 from functools import partial

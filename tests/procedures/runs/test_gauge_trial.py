@@ -1,7 +1,5 @@
 """Gauges that are mounted wrongly or off their middle are named before anything is measured with them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """At the first reference a run measures the noise, once however often it is stopped, and uses it."""
 
-from __future__ import annotations
-
 import asyncio
 from typing import Any
 

@@ -5,8 +5,6 @@ can have README.md as a page where it is. Formulas become MathML by docutils, wh
 draws by itself: no script and no font has to be fetched or bundled.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path

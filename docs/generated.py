@@ -4,8 +4,6 @@ A page has a line ``<!-- made from the program: NAME -->``; :func:`page_with_gen
 of that name there, as Markdown.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 from collections.abc import Callable, Iterable, Iterator

@@ -1,7 +1,5 @@
 """The messages for people that the program's source has: errors, rules of the cell file, guards."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator

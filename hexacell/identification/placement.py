@@ -1,7 +1,5 @@
 """A robot at some poses, and what small errors of its legs and joints do to these."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
 

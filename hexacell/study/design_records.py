@@ -1,7 +1,5 @@
 """Records of one robot by several ways to choose orientations, equally many at the same points."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum

@@ -4,8 +4,6 @@ The policy is data: an escalation, a sequence of actions, for every kind of fail
 the cell file). Each attempt is an event, so the state of a run knows which action is next.
 """
 
-from __future__ import annotations
-
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass

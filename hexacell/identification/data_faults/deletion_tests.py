@@ -4,8 +4,6 @@ If a record disagrees, the simplest cause is looked for: a leg whose joint varia
 one wrong gauge, or several.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass
 

@@ -20,8 +20,6 @@ with M of :class:`.LinearizedModel`, of which only the blocks of the records con
 Source: Rao, Proc. Cambridge Phil. Soc. 44, 1948 (score test).
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace

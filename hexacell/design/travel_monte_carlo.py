@@ -121,7 +121,7 @@ class TravelConstraint:
         poses = forward_kinematics(belief.mechanism, belief.estimate, joints, poses).poses
         sensitivity = free_sensitivity(belief.mechanism, belief.estimate, poses, joints)
         scenario = _Scenario(belief, zero, joints, poses, sensitivity)
-        sigma = belief.orientation_sigma_from(sensitivity)
+        sigma = float(belief.orientation_sigmas(sensitivity[:1])[0])
         if sigma > UNCERTAIN_SIGMA:
             return scenario.nearly_all_hold()
         every = np.arange(len(targets))

@@ -110,12 +110,13 @@ class RobotBelief:
 
         About the base axis about which it is known least.
         """
-        at_first = poses[:1], joints[:1]
-        return self.orientation_sigma_from(free_sensitivity(self.mechanism, self.estimate, *at_first))
+        at_first = free_sensitivity(self.mechanism, self.estimate, poses[:1], joints[:1])
+        return float(self.orientation_sigmas(at_first)[0])
 
-    def orientation_sigma_from(self, sensitivity: FreeSensitivity) -> float:
-        """Standard deviation, rad, of the platform's orientation at the first pose of a sensitivity."""
-        return float(self._orientation_sigmas(sensitivity.free[:1])[0])
+    def orientation_sigmas(self, sensitivity: FreeSensitivity) -> Array:
+        """Standard deviations (n,), rad, of the platform's orientation, from the ``sensitivity`` there."""
+        rotation = sensitivity.free[:, 3:]
+        return np.asarray(np.sqrt(((rotation @ self.covariance) * rotation).sum(axis=-1).max(axis=-1)))
 
     @cached_property
     def least_margins(self) -> Array:
@@ -138,11 +139,12 @@ class RobotBelief:
             return np.zeros((len(at.joints), 0))
         sensitivity = free_sensitivity(self.mechanism, self.estimate, at.poses, at.joints)
         margins = np.tile(self.least_margins, (len(at.joints), 1))
-        known = np.flatnonzero(self._orientation_sigmas(sensitivity.free) <= UNCERTAIN_SIGMA)
+        known = np.flatnonzero(self.orientation_sigmas(sensitivity) <= UNCERTAIN_SIGMA)
         if len(known):
             there = at[known]
-            sigmas = self.margin_sigmas(there.poses, there.joints, sensitivity[known])
-            margins[known] += SPARE_SIGMAS * sigmas
+            margins[known] += SPARE_SIGMAS * self.margin_sigmas(
+                there.poses, there.joints, sensitivity[known]
+            )
         return margins
 
     def margin_sigmas(self, poses: PoseBatch, joints: Array, sensitivity: FreeSensitivity) -> Array:
@@ -163,11 +165,6 @@ class RobotBelief:
         margins = self.limits.leg_margins(self.mechanism, robots, moved, joints[rows])
         margins = margins.reshape(count, every, margins.shape[-1])
         return np.asarray(np.linalg.norm(margins[:, 1:] - margins[:, :1], axis=1))
-
-    def _orientation_sigmas(self, by_free: Array) -> Array:
-        """:meth:`orientation_sigma` at n poses with the derivatives (n, 6, p)."""
-        rotation = by_free[:, 3:]
-        return np.asarray(np.sqrt(((rotation @ self.covariance) * rotation).sum(axis=-1).max(axis=-1)))
 
     def keeps_limits(self, poses: PoseBatch, joints: Array, wanted: Array | None = None) -> Mask:
         """Whether the estimated robot keeps its limits at n poses with joint variables (n, 6), mm.

@@ -44,11 +44,6 @@ class ChosenTerms:
     findings: tuple[TermFinding, ...] = ()
     offered: tuple[ModelTerm, ...] = ()
 
-    @property
-    def are_likely(self) -> bool:
-        """Whether the records are more probable with any of them than without."""
-        return any(one.log_factor > 0.0 for one in self.findings)
-
 
 def choose_terms(found: Identification) -> ChosenTerms:
     """Choose among the terms that the problem of an identification offers.
@@ -105,7 +100,7 @@ class _Search:
         """Take the term of most evidence, then the best beside it, and so on."""
         taken: Model = ()
         findings = dict[str, TermFinding]()
-        while left := [name for name in self.offered if name not in _names(taken)]:
+        while left := self._beside(taken):
             beside = {name: self._gain(name, taken) for name in left}
             for name, (gain, _) in beside.items():
                 findings[name] = TermFinding(name, Finding.NOT_SHOWN, gain)
@@ -121,9 +116,8 @@ class _Search:
             taken = (*taken, term)
         for term in taken:
             if rival := self._rival(term, taken):
-                taken = tuple(one for one in taken if one is not term)
-                unclear = replace(findings[term.name], finding=Finding.NOT_DISTINCT, rival=rival)
-                findings[term.name] = unclear
+                taken, one = tuple(one for one in taken if one is not term), findings[term.name]
+                findings[term.name] = replace(one, finding=Finding.NOT_DISTINCT, rival=rival)
         return ChosenTerms(taken, tuple(findings[name] for name in self.offered))
 
     def _gain(self, name: str, taken: Model) -> tuple[float, ModelTerm]:
@@ -138,12 +132,15 @@ class _Search:
         """A term that in the place of a taken one explains the records nearly as well."""
         others = tuple(one for one in taken if one is not term)
         own, _ = self._gain(term.name, others)
-        for name in self.offered:
-            if name not in _names(taken):
-                instead, _ = self._gain(name, others)
-                if instead >= self.least and own - instead < DISTINCT:
-                    return name
+        for name in self._beside(taken):
+            instead, _ = self._gain(name, others)
+            if instead >= self.least and own - instead < DISTINCT:
+                return name
         return ""
+
+    def _beside(self, taken: Model) -> list[str]:
+        names = [term.name for term in taken]
+        return [name for name in self.offered if name not in names]
 
     def _model(self, terms: Model) -> LinearCosts:
         each = (term.pose_errors(self.records, self.records.directions)[:, :3] for term in terms)
@@ -156,13 +153,9 @@ class _Search:
 
     def _predicted(self, terms: Model) -> float:
         """Sum of the logarithms of the densities of each point's records, given all others."""
-        model, points = self._model(terms), self.without.problem.labels[:, 0]
         everything = self._evidence(terms)
         if self.without.problem.points < 2:
             return everything
+        model, points = self._model(terms), self.without.problem.labels[:, 0]
         others = (model.log_evidence(points != point, self.scale) for point in np.unique(points))
         return float(sum(everything - one for one in others))
-
-
-def _names(terms: Model) -> set[str]:
-    return {term.name for term in terms}

@@ -42,13 +42,8 @@ SMALLEST_ROTATION = 1e-3
 def identify(problem: Problem, *, find_outliers: bool = True) -> Identification:
     """Identify the geometry from all records, without those that have a data fault.
 
-    Args:
-        problem: n records, with the prior and the noise.
-        find_outliers: whether records are tested; without it all of them are used.
-
-    Returns:
-        The p free parameters, mm, with their covariance (p, p), mm^2, and what is wrong with the records
-        that were left out.
+    With ``find_outliers`` false records are not tested, and all of them are used. The result says what is
+    wrong with the records that were left out.
 
     Raises:
         IdentifiabilityError: the records cannot determine the parameters.
@@ -58,16 +53,12 @@ def identify(problem: Problem, *, find_outliers: bool = True) -> Identification:
     _require_rotation_diversity(problem)
     if find_outliers and (fault := wrong_unit(problem)) is not None:
         raise GaugeFaultError(fault)
-    findings: tuple[TermFinding, ...] = ()
     try:
-        if find_outliers:
-            selection, findings = _without_faults(problem)
-        else:
-            selection = Selection.of_all(problem)
+        selection, findings = _without_faults(problem) if find_outliers else (Selection.of_all(problem), ())
     except UncorrectableFaultError as refused:
         raise GaugeFaultError(messages.refused(refused)) from None
-    fit, faults = selection.selected.fit, messages.left_out(selection)
-    found = replace(fit, data_faults=faults, tried_terms=findings)
+    faults = messages.left_out(selection)
+    found = replace(selection.selected.fit, data_faults=faults, tried_terms=findings)
     _require_enough_records(found.problem)
     return found
 
@@ -89,7 +80,8 @@ def _without_faults(problem: Problem) -> tuple[Selection, tuple[TermFinding, ...
     quick = fit_regularized(problem, QUICK)
     first = quick if quick.converged else fit_regularized(problem)
     chosen = choose_terms(first)
-    if chosen.are_likely:  # what they do is linearized where they do not bend the geometry
+    if any(one.log_factor > 0.0 for one in chosen.findings):
+        # What they do is linearized where they do not bend the geometry.
         chosen = choose_terms(_fitted_with(chosen.offered, problem, first))
     if not chosen.taken:
         return select_faults(problem, quick), chosen.findings
@@ -184,32 +176,23 @@ def _axis_and_missing(direction: Array) -> tuple[str, str]:
         x, y, z = direction * np.sign(direction[nearest])
         return f"the axis ({x:.2f}, {y:.2f}, {z:.2f})", "turn about axes across it too"
     axis = "xyz"[nearest]
-    return axis, " and ".join(
-        rotation for name, rotation in rotations_about.items() if name != axis
-    ) + " too"
+    others = " and ".join(rotation for name, rotation in rotations_about.items() if name != axis)
+    return axis, f"{others} too"
 
 
 def estimate_online(problem: Problem, options: SolverOptions = COARSE) -> Identification:
-    """Estimate the geometry from the records so far, with the full prior and without any check.
-
-    Args:
-        problem: n records; with few of them, the prior determines the rest.
-        options: of the solver, which starts at the initial parameters of the problem.
-    """
+    """Estimate the geometry from the records so far, with the full prior and without any check."""
     precision = problem.prior.precision
     kept, solution = solve_around_singularities(problem, precision, options)
     return Identification(kept, solution, precision)
 
 
 def without_gross_errors(found: Identification) -> Iterator[Identification]:
-    """Estimates without the most significant gross error, without two, and so on.
+    """Online estimates without the most significant gross error, without two, and so on.
 
     Each continues the last one, needs no fit from the drawing, and looks for no cause: what is false, and
     why, is found from all records by :func:`identify`. Records are left out only while the others have
     equations to spare; fewer agree with anything, and prove nothing.
-
-    Args:
-        found: an online estimate.
     """
     largest = LARGEST_REJECTED_SHARE * found.records
     rejected = 0

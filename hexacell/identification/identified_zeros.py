@@ -27,7 +27,7 @@ from hexacell.identification.diagnostics.frame_alignment import frame_derivative
 from hexacell.identification.solver.result import UNDETERMINED_RATIO, Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism, free_parameter_derivatives
-from hexacell.kinematics.rotations import Array
+from hexacell.kinematics.rotations import Array, Mask
 
 SAME_CHANGE = 1e-6
 """Share of the largest singular value below which a common change of the zeros is one of the frames."""
@@ -58,9 +58,8 @@ def zero_columns(mechanism: Mechanism, geometry: Geometry) -> Array:
 class HeldParameters:
     """What is identified beside parameters that are held.
 
-    Attributes:
-        columns: (p, k) changes of the free parameters by the zeros.
-        tolerances: (p, p) covariance of all free parameters by the drawing, or by an earlier result.
+    ``columns`` (p, k) are changes of the free parameters by the zeros, ``tolerances`` (p, p) the covariance
+    of all free parameters by the drawing, or by an earlier result.
     """
 
     columns: Array
@@ -145,16 +144,16 @@ class IdentifiedZeros:
     @property
     def names(self) -> tuple[str, ...]:
         """The parameters that the zeros change."""
-        changed = np.abs(self.found.problem.basis @ self.kept.columns).max(axis=1) > SAME_CHANGE
-        names = self.found.geometry.parameters.names
-        return tuple(names[row] for row in np.flatnonzero(changed))
+        return self._named(np.abs(self.found.problem.basis @ self.kept.columns).max(axis=1) > SAME_CHANGE)
 
     @property
     def undetermined(self) -> tuple[str, ...]:
         """The zeros' parameters that the records determine hardly better than the drawing."""
         taken = self.found.problem.basis @ self.projector
         by_noise = np.sqrt(np.diag(taken @ self.found.free_covariance @ taken.T))
-        limits = UNDETERMINED_RATIO * self.found.prior_sigma
-        names = self.found.geometry.parameters.names
-        unknown = {names[row] for row in np.flatnonzero(by_noise > limits)}
+        unknown = self._named(by_noise > UNDETERMINED_RATIO * self.found.prior_sigma)
         return tuple(name for name in self.names if name in unknown)
+
+    def _named(self, rows: Mask) -> tuple[str, ...]:
+        names = self.found.geometry.parameters.names
+        return tuple(names[row] for row in np.flatnonzero(rows))

@@ -45,11 +45,8 @@ ROOM_KEPT = 0.5
 class Allowances:
     """What may be off at a stop, at a standstill or back at a reference.
 
-    Attributes:
-        settings: of the cell, as stated.
-        robot: with the geometry that its controller has, and the noise of a record as known by now.
-        is_measured: whether its noise was measured.
-        found: what was identified, once it was.
+    ``robot`` has the geometry that its controller has, and the noise of a record as known by now, which may
+    have been measured; ``found`` is what was identified, once it was.
     """
 
     settings: CellSettings

@@ -112,13 +112,8 @@ def approach_scatter(
 ) -> RepeatedApproaches | None:
     """The scatter of visits of one pose; None with fewer than ``FEWEST_VISITS``.
 
-    Args:
-        deviations: of the ball along base x, y, z (m, 3), mm.
-        joints: what the encoders showed (m, 6), mm.
-        ball: how it moves by what the encoders show.
-        encoders: stated noise of each encoder (6,) in a record.
-        gauges_mm: likewise of the gauges (3,).
-        joint_unit: of the joint variables.
+    They showed ``deviations`` of the ball along base x, y, z (m, 3), mm, and ``joints`` (m, 6). The noise
+    of each instrument in a record is stated as ``encoders`` (6,) and ``gauges_mm`` (3,).
     """
     if len(deviations) < FEWEST_VISITS:
         return None
@@ -151,8 +146,7 @@ def approach_scatter(
     alone = max(ALONE, key=lambda one: excesses[one][0])
     is_alone = excesses[alone][0] >= excesses[together][0] + np.log(INSTRUMENT_ODDS)
     source = alone if is_alone else together
-    unit = JointUnit.MM if source.instruments[:3].any() else joint_unit
-    excess = excesses[source][1]
+    unit, excess = JointUnit.MM if source.instruments[:3].any() else joint_unit, excesses[source][1]
     by_encoders = 0.0 if source is ScatterSource.JOINTS else excess**2 * source.instruments[3:]
     stops = _stops(visits, encoders**2 + by_encoders)
     return found.model_copy(update={"source": source, "unit": unit, "excess": excess, "stops": stops})
@@ -168,7 +162,7 @@ def _stops(visits: _Visits, variances: Array) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Visits:
-    """Visits of one pose.
+    """Visits of one pose, one more than ``freedom``.
 
     Attributes:
         products: (9, 9), mm^2, of ball and joints less their means, summed over the visits.

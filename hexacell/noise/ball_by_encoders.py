@@ -68,10 +68,8 @@ class BallByEncoders:
         near = apply_twist(poses[np.zeros(len(moved), dtype=int)], moved @ whole.T)
         by_free = free_sensitivity(mechanism, geometry, near, joints + moved, POSITION).free
         ahead, behind = np.split(by_free, 2)
-        changes = (ahead - behind) / (2.0 * steps[:, None, None])
-        factor = covariance_factor(belief.covariance)
-        to_base = robot.frames.base.T
-        unknown = np.einsum("ab,jbp,pk->akj", to_base, changes, factor)
+        changes, to_base = (ahead - behind) / (2.0 * steps[:, None, None]), robot.frames.base.T
+        unknown = np.einsum("ab,jbp,pk->akj", to_base, changes, covariance_factor(belief.covariance))
         return cls(to_base @ whole[:3], np.asarray(unknown))
 
     def motion(self, joints: Array) -> Array:

@@ -16,7 +16,6 @@ from functools import cached_property
 from itertools import permutations, product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexacell.distributions import variance_ratio_exceedance
 from hexacell.kinematics.rotations import Array
@@ -35,10 +34,6 @@ LARGEST_RESPONSE = 30.0
 
 LEAST_RESPONSE_INCHES = 0.027
 """Share of the moves below which a gauge follows nothing. In inches it shows a 25.4th of them."""
-
-
-Numbers = dict[int, int]
-
 
 TWO_MISTAKES = 0.3
 """How much better a set with exchanged and reversed gauges must explain what was shown."""
@@ -112,28 +107,25 @@ class GaugeTrial:
 def judge_response(response: Array) -> tuple[TrialFinding, ...]:
     """What is wrong with the gauges by their response (3, 3); nothing if they are as they should be."""
     size = np.linalg.norm(response, axis=1)
-    axes, signs = _best_assignment(response, size, np.flatnonzero(size >= LEAST_RESPONSE_INCHES))
     # Of fewer than three gauges the axes are less certain: these are judged once the others live.
-    if dead := [gauge for gauge in range(3) if gauge not in axes]:
+    if dead := np.flatnonzero(~(size >= LEAST_RESPONSE_INCHES)).tolist():
         return (TrialFinding(GaugeMistake.DEAD, tuple(dead)),)
+    axes, signs = _best_assignment(response / size[:, None])
     groups = {
-        GaugeMistake.INCHES: [gauge for gauge in axes if size[gauge] < LEAST_RESPONSE],
-        GaugeMistake.MICROMETRES: [gauge for gauge in axes if size[gauge] > LARGEST_RESPONSE],
-        GaugeMistake.EXCHANGED: [gauge for gauge, axis in axes.items() if gauge != axis],
-        GaugeMistake.REVERSED: [gauge for gauge, sign in signs.items() if sign < 0],
+        GaugeMistake.INCHES: [gauge for gauge in range(3) if size[gauge] < LEAST_RESPONSE],
+        GaugeMistake.MICROMETRES: [gauge for gauge in range(3) if size[gauge] > LARGEST_RESPONSE],
+        GaugeMistake.EXCHANGED: [gauge for gauge, axis in enumerate(axes) if gauge != axis],
+        GaugeMistake.REVERSED: [gauge for gauge, sign in enumerate(signs) if sign < 0],
     }
     return tuple(TrialFinding(mistake, tuple(gauges)) for mistake, gauges in groups.items() if gauges)
 
 
-def _best_assignment(response: Array, size: Array, alive: NDArray[np.intp]) -> tuple[Numbers, Numbers]:
-    """The axis that each gauge alive follows, and its sign."""
-    followed = response[alive] / size[alive, None]
-    rows, first = np.arange(len(alive)), tuple(alive.tolist())
+def _best_assignment(followed: Array) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """The axis that each gauge follows, and its sign, by its response (3, 3) of unit length."""
 
     def agreement(axes: tuple[int, ...], signs: tuple[int, ...]) -> float:
-        agree = float((followed[rows, list(axes)] * signs).sum())
-        return agree - TWO_MISTAKES if axes != first and -1 in signs else agree
+        agree = float((followed[range(3), axes] * signs).sum())
+        return agree - TWO_MISTAKES if axes != (0, 1, 2) and -1 in signs else agree
 
-    every = product(permutations(range(3), len(alive)), product((1, -1), repeat=len(alive)))
-    axes, signs = max(every, key=lambda one: agreement(*one))
-    return dict(zip(first, axes, strict=True)), dict(zip(first, signs, strict=True))
+    every = product(permutations(range(3)), product((1, -1), repeat=3))
+    return max(every, key=lambda one: agreement(*one))

@@ -66,9 +66,11 @@ def with_measured_noise(settings: CellSettings, measured: MeasuredNoise) -> Cell
     """The settings of a cell with what was measured in the place of what they state."""
     gauges: Point = tuple(one.record for one in measured.gauges)  # type: ignore[assignment]
     encoders: SixNumbers = tuple(one.record for one in measured.encoders)  # type: ignore[assignment]
-    noise = settings.noise.model_copy(
-        update={"gauges_mm": gauges, "encoders": encoders, "stops": _stops(settings, measured)}
-    )
+    stated, approaches = settings.noise, measured.approaches
+    stops = stated.stops
+    if approaches is not None:  # as measured, unless more is stated and holds
+        stops = approaches.stops if stated.figures == "measured" else max(stops, approaches.stops)
+    noise = stated.model_copy(update={"gauges_mm": gauges, "encoders": encoders, "stops": stops})
     seconds = TimeModel.of(settings).record_seconds + averaging_seconds(settings, measured.windows)
     return settings.model_copy(
         update={
@@ -82,14 +84,6 @@ def with_measured_noise(settings: CellSettings, measured: MeasuredNoise) -> Cell
 def averaging_seconds(settings: CellSettings, windows: int) -> float:
     """How much longer a record takes that is the mean of some windows."""
     return (windows - 1) * settings.timing.window_s
-
-
-def _stops(settings: CellSettings, measured: MeasuredNoise) -> float:
-    """Where joints stop beside their commands: as measured, unless more is stated and holds."""
-    stated, approaches = settings.noise, measured.approaches
-    if approaches is None:
-        return stated.stops
-    return approaches.stops if stated.figures == "measured" else max(stated.stops, approaches.stops)
 
 
 def _stated_effects(settings: CellSettings, measured: MeasuredNoise) -> object:

@@ -65,7 +65,24 @@ class NoiseReadings:
 
 def assess_noise(plan: Plan, readings: NoiseReadings) -> MeasuredNoise:
     """The noise of the records that a plan is carried out with from now on."""
-    return _NoiseAssessment(plan, readings).result()
+    assessment, stated = _NoiseAssessment(plan, readings), plan.robot.noise
+    sigmas = {windows: assessment.of_records(windows) for windows in WINDOWS}
+    noise = {
+        windows: stated.with_devices(sigma[3:].tolist(), sigma[:3].tolist())
+        for windows, sigma in sigmas.items()
+    }
+    forecaster = AveragingForecaster(plan)
+    forecasts = forecaster.forecasts(noise)
+    windows = worthwhile_windows(forecasts, plan.settings.noise.averaged_windows)
+    x, y, z, *encoders = assessment.instruments(windows)
+    return MeasuredNoise(
+        gauges=(x, y, z),
+        encoders=tuple(encoders),
+        approaches=assessment.scatter,
+        windows=windows,
+        forecasts=forecasts,
+        encoders_part_mm=forecaster.encoders_part(noise[1]),
+    )
 
 
 def visits_agree(plan: Plan, readings: NoiseReadings) -> bool:
@@ -101,26 +118,6 @@ class _NoiseAssessment:
     found: Identification | None = None
     drifted_mm: float = 0.0
 
-    def result(self) -> MeasuredNoise:
-        by_windows = {windows: self._of_records(windows) for windows in WINDOWS}
-        stated = self.plan.robot.noise
-        noise = {
-            windows: stated.with_devices(sigma[3:].tolist(), sigma[:3].tolist())
-            for windows, sigma in by_windows.items()
-        }
-        forecaster = AveragingForecaster(self.plan)
-        forecasts = forecaster.forecasts(noise)
-        windows = worthwhile_windows(forecasts, self.plan.settings.noise.averaged_windows)
-        x, y, z, *encoders = self.instruments(windows)
-        return MeasuredNoise(
-            gauges=(x, y, z),
-            encoders=tuple(encoders),
-            approaches=self.scatter,
-            windows=windows,
-            forecasts=forecasts,
-            encoders_part_mm=forecaster.encoders_part(noise[1]),
-        )
-
     @cached_property
     def stated(self) -> Array:
         """The stated noise of a record (9,), mm."""
@@ -148,7 +145,7 @@ class _NoiseAssessment:
             return found.model_copy(update={"source": None, "excess": 0.0})
         return found
 
-    def _of_records(self, windows: int) -> Array:
+    def of_records(self, windows: int) -> Array:
         """The noise (9,) of records that are means of some windows, with what does not repeat."""
         scatter, allowed = self.scatter, self.stated
         allows_less = self.plan.settings.noise.figures == "measured"
@@ -182,7 +179,7 @@ class _NoiseAssessment:
 
     def instruments(self, windows: int) -> Iterator[InstrumentNoise]:
         """The noise of each, in records that are means of some windows."""
-        records = self._of_records(windows)
+        records = self.of_records(windows)
         gauges = sorted(self.plan.settings.gauges, key=lambda gauge: gauge.axis)
         names = [*(f"gauge {one.name}" for one in gauges), *(f"encoder {leg}" for leg in range(1, 7))]
         units = [JointUnit.MM] * 3 + [self.plan.robot.mechanism.words.joint_unit] * 6
@@ -208,13 +205,11 @@ class AveragingForecaster:
         """Errors by the noise of records of some windows each; empty where no accuracy is predicted."""
         errors = {windows: self.end_error(one) for windows, one in noise.items()}
         records = sum(self.plan.forecaster.planned(CampaignState()).values())
-        settings = self.plan.settings
+        minutes = {
+            windows: records * averaging_seconds(self.plan.settings, windows) / 60.0 for windows in noise
+        }
         return tuple(
-            AveragingForecast(
-                windows=windows,
-                error_mm=error,
-                minutes=records * averaging_seconds(settings, windows) / 60.0,
-            )
+            AveragingForecast(windows=windows, error_mm=error, minutes=minutes[windows])
             for windows, error in errors.items()
             if error is not None
         )

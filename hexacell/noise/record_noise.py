@@ -50,9 +50,8 @@ MIN_CORRELATION = -0.9
 class Repeatability:
     """Scatter of the deviations over visits of the same pose.
 
-    Attributes:
-        per_axis_mm: pooled standard deviations along x, y and z.
-        degrees_of_freedom: of each of them: visits minus poses.
+    ``per_axis_mm`` are pooled standard deviations along x, y and z, each with the same degrees of freedom:
+    visits minus poses.
     """
 
     per_axis_mm: tuple[float, float, float]

@@ -66,9 +66,7 @@ class ReadingNoise:
 
 
 def reading_noise(values: Array, step_mm: float) -> ReadingNoise:
-    """The noise of a series (n,), mm, of readings at equal intervals.
-
-    ``step_mm`` is that of the display.
+    """The noise of a series (n,), mm, of readings at equal intervals from a display of some step.
 
     Raises:
         ValueError: the series has fewer than ``SMALLEST_SERIES`` readings.

@@ -83,13 +83,10 @@ class UncertaintyBudget:
     def of(
         cls, propagation: Propagation, effects: Iterable[Effect], scale: ScaleObservation | None = None
     ) -> UncertaintyBudget:
-        """The budget of an identification for a task.
+        """The budget of an identification for the task of its propagation.
 
-        Args:
-            propagation: of the identification at the t task poses.
-            effects: that the machine may have; one that the mechanism cannot have gets no line.
-            scale: what a length check, with the :attr:`parameter_columns` of this budget, measured of the
-                scale common to all encoders, in the place of the size stated for it.
+        An effect that the mechanism cannot have gets no line. A ``scale`` that a length check with the
+        :attr:`parameter_columns` of this budget measured takes the place of the size stated for it.
         """
         found, zeros = propagation.found, propagation.zeros
         terms = found.terms if zeros is None else None
@@ -128,11 +125,8 @@ class UncertaintyBudget:
     def errors_of(self, difference: Array, *, of_geometry: bool = False) -> TaskErrors:
         """The errors of a geometry whose free parameters differ by (p,) from the estimate.
 
-        They are those of one round of visits to the task poses; those ``of_geometry`` are without the
-        scatter of the stops, which no geometry corrects.
-
-        They are estimated from the difference, and from effects that were measured, as the scale in a
-        length check; what is not known of them is that of the estimate.
+        They are estimated from that difference, and from effects that were measured, for one round of
+        visits to the task poses; those ``of_geometry`` are without the scatter of the stops.
         """
         estimated = self.known - self.jacobian @ difference
         lines = [line for line in self.lines if not (of_geometry and line.effect.occurrence is STOPS)]

@@ -13,16 +13,13 @@ from functools import partial
 import numpy as np
 
 from hexacell.identification.placement import Placement, RecordPlacement, Weight, leg_forces
-from hexacell.identification.thermal_expansion import longer_legs
+from hexacell.identification.thermal_expansion import UM_PER_M, longer_legs
 from hexacell.kinematics.parameters import LEGS, JointUnit, MachinePart
 from hexacell.kinematics.rotations import Array
-from hexacell.uncertainty.effects import UM, Effect, Occurrence
+from hexacell.uncertainty.effects import THOUSANDTH, Effect, Occurrence
 
 COMMON_SCALE = "scale common to all encoders"
 """The effect that a length check measures."""
-
-THOUSANDTH = 1e-3
-"""A micrometre in mm, a millidegree in deg."""
 
 
 def common_encoder_scale(um_per_m: float) -> Effect:
@@ -57,8 +54,7 @@ def encoder_eccentricities(mdeg: float) -> Effect:
         both = np.concatenate([np.cos(angles) * np.eye(LEGS), np.sin(angles) * np.eye(LEGS)], axis=-1)
         return at.by_joints(THOUSANDTH * (np.sqrt(0.5) * both))
 
-    name = "eccentricity of each encoder"
-    return Effect(name, mdeg, "mdeg", Occurrence.CONSTANT, waves)
+    return Effect("eccentricity of each encoder", mdeg, "mdeg", Occurrence.CONSTANT, waves)
 
 
 REPEATABILITY = "repeatability"
@@ -97,7 +93,6 @@ def stop_repeatability(
     """
     occurrence = Occurrence.STOPS_AT_WORK if is_in_noise else Occurrence.EVERY_STOP
     name = f"{REPEATABILITY} of a {joint}"
-
     return Effect(name, size, unit.thousandth, occurrence, _by_stops)
 
 
@@ -116,16 +111,9 @@ def _by_stops(at: Placement) -> Array:
     return at.by_joints(np.broadcast_to(THOUSANDTH * np.eye(LEGS), (len(at), LEGS, LEGS)))
 
 
-UM_PER_M = 1e-6
-"""A relative expansion."""
-
-
 def temperature_at_work(kelvin: float, um_per_m_k: Mapping[MachinePart, float]) -> Effect:
     """The whole machine is warmer at work than it was while measuring."""
-
-    def expansion(placement: Placement) -> Array:
-        return _warmer(placement, um_per_m_k)
-
+    expansion = partial(_warmer, um_per_m_k=um_per_m_k)
     return Effect("temperature at work", kelvin, "K", Occurrence.AT_WORK, expansion)
 
 
@@ -136,8 +124,7 @@ def temperature_while_measuring(kelvin: float, um_per_m_k: Mapping[MachinePart, 
         progress = np.linspace(-0.5, 0.5, len(placement))
         return progress[:, None, None] * _warmer(placement, um_per_m_k)
 
-    name = "temperature while measuring"
-    return Effect(name, kelvin, "K", Occurrence.MEASURING, expansion)
+    return Effect("temperature while measuring", kelvin, "K", Occurrence.MEASURING, expansion)
 
 
 def thermometers_of_legs(kelvin: float, um_per_m_k: float) -> Effect:
@@ -172,7 +159,7 @@ def load_at_work(newton: float, um_per_n: float) -> Effect:
         # Virtual work: leg forces t hold a force F on the platform if J^T t = F. With A = -J^-1 the legs
         # yield by c t, and the platform by c A A^T F.
         inverse = placement.by_constraints
-        return np.asarray(UM * um_per_n * inverse @ np.swapaxes(inverse[:, :3], -1, -2))
+        return np.asarray(THOUSANDTH * um_per_n * inverse @ np.swapaxes(inverse[:, :3], -1, -2))
 
     return Effect("load at work", newton, "N", Occurrence.AT_WORK, bending)
 
@@ -182,17 +169,14 @@ LEGS_DIFFER = 0.3
 
 
 def own_weight(newton: float, um_per_n: float, weight: Weight) -> Effect:
-    """Each leg yields by its part of a weight on the platform, all nearly alike.
+    """Each leg yields by its part of a weight of so many newtons on the platform, all nearly alike.
 
-    Args:
-        newton: how heavy it is.
-        um_per_n: compliance of a leg with its joints, one standard deviation.
-        weight: how it acts.
+    ``um_per_n`` is the compliance of a leg with its joints, one standard deviation.
     """
 
     def yielding(placement: Placement) -> Array:
         forces = leg_forces(placement, weight)
-        each = UM * um_per_n * placement.by_constraints * forces[:, None, :]
+        each = THOUSANDTH * um_per_n * placement.by_constraints * forces[:, None, :]
         return np.concatenate([each.sum(axis=-1, keepdims=True), LEGS_DIFFER * each], axis=-1)
 
     return Effect("own weight", newton, "N", Occurrence.CONSTANT, yielding)
@@ -250,8 +234,7 @@ def _oval(records: RecordPlacement) -> Array:
     harmonics = np.stack(
         [x * y, y * z, z * x, 0.5 * (x * x - y * y), (3.0 * z * z - 1.0) / np.sqrt(12.0)], axis=-1
     )
-    amplitude = UM * np.sqrt(1.5)
-    return np.asarray(amplitude * np.einsum("ag,ngk->nak", records.gauges, harmonics))
+    return np.asarray(THOUSANDTH * np.sqrt(1.5) * np.einsum("ag,ngk->nak", records.gauges, harmonics))
 
 
 def rail_directions(mrad: float) -> Effect:
@@ -269,7 +252,7 @@ def rail_waves(um: float, wavelength_mm: float) -> Effect:
 
     def waves(along: Array) -> Array:
         phase = 2.0 * np.pi * along / wavelength_mm
-        return np.asarray(UM / np.sqrt(2.0) * np.stack([np.sin(phase), np.cos(phase)], axis=-1))
+        return np.asarray(THOUSANDTH / np.sqrt(2.0) * np.stack([np.sin(phase), np.cos(phase)], axis=-1))
 
     name = f"waves of the rails, {wavelength_mm:g} mm long"
     columns = partial(_across_rails, shapes=waves)
@@ -285,7 +268,7 @@ def common_sag(um: float, half_length_mm: float) -> Effect:
     def sagging(placement: Placement) -> Array:
         if placement.guides is None:
             return np.zeros((len(placement), 6, 0))
-        depth = UM * (placement.guides.along / half_length_mm) ** 2
+        depth = THOUSANDTH * (placement.guides.along / half_length_mm) ** 2
         return np.asarray(placement.by_constraints @ (placement.guides.across[..., 1] * depth)[..., None])
 
     return Effect("sag common to all rails", um, "um", Occurrence.CONSTANT, sagging)

@@ -16,8 +16,8 @@ from hexacell.identification.placement import Placement, RecordPlacement
 from hexacell.identification.problem.prior import SystematicErrors
 from hexacell.kinematics.rotations import Array
 
-UM = 1e-3
-"""A micrometre in mm."""
+THOUSANDTH = 1e-3
+"""A micrometre in mm, a millidegree in deg."""
 
 
 class Occurrence(Enum):

@@ -38,8 +38,8 @@ from hexacell.kinematics.corrections import NO_CORRECTIONS, Corrections
 from hexacell.kinematics.parameters import LEGS, JointUnit
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.uncertainty.effect_kinds import COMMON_SCALE, THOUSANDTH, common_encoder_scale
-from hexacell.uncertainty.effects import Effect, Occurrence, errors_of_records
+from hexacell.uncertainty.effect_kinds import COMMON_SCALE, common_encoder_scale
+from hexacell.uncertainty.effects import THOUSANDTH, Effect, Occurrence, errors_of_records
 
 
 @dataclass(frozen=True, slots=True, eq=False)

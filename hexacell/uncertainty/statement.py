@@ -48,13 +48,9 @@ class TaskErrors:
 
     @classmethod
     def of(cls, jacobian: Array, difference: Array, covariance: Array, systematic: Array) -> TaskErrors:
-        """The errors of a geometry that differs from the estimate.
+        """The errors, by a jacobian (n, 6, p), of a geometry that differs by (p,) from the estimate.
 
-        Args:
-            jacobian: (n, 6, p) of the errors by the free parameters.
-            difference: (p,) of the geometry from the estimate.
-            covariance: (p, p) of the estimate.
-            systematic: (n, 6, k) effects that no covariance contains.
+        ``covariance`` (p, p) is that of the estimate, and ``systematic`` (n, 6, k) are effects beside it.
         """
         by_noise = jacobian @ covariance_factor(covariance)
         return cls(jacobian @ difference, np.concatenate([by_noise, systematic], axis=-1))

@@ -48,9 +48,9 @@ class CorrectedFit:
     faults: tuple[FaultHypothesis, ...] = ()
 
     @classmethod
-    def uncorrected(cls, problem: Problem) -> CorrectedFit:
+    def uncorrected(cls, problem: Problem, options: SolverOptions = QUICK) -> CorrectedFit:
         """The fit of all records as measured."""
-        return cls.fitted(problem, problem)
+        return cls.fitted(problem, problem, options=options)
 
     @classmethod
     def fitted(

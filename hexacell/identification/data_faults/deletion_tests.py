@@ -14,7 +14,6 @@ from hexacell.identification.data_faults.hypotheses import GAUGE_FAULTS
 from hexacell.identification.data_faults.outlier_statistics import OutlierStatistics, model_at, row_of
 from hexacell.identification.problem.commanded_poses import ACCEPTED_MM
 from hexacell.identification.problem.problem import Problem
-from hexacell.identification.solver.linear_model import LinearizedModel
 from hexacell.identification.solver.result import GAUGES, DataFaultKind, Identification
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import Deviation, RecordId, deviation_of
@@ -73,24 +72,18 @@ def deletion_tests(
     problem: Problem, fit: Identification, without: Collection[RecordId]
 ) -> dict[RecordId, DeletionTest]:
     """Test each record of a problem that a fit does without, but for some others."""
-    used = fit.problem.record_ids
-    known = {*used, *without}
+    known = {*fit.problem.record_ids, *without}
     left_out = [record for record in problem.record_ids if record not in known]
-    return {
-        record: _deletion_test(
-            problem, record, model_at(problem, fit.free, fit.active_prior, among={*used, record})
-        )
-        for record in left_out
-    }
+    return {record: _deletion_test(problem, fit, record) for record in left_out}
 
 
-def _deletion_test(problem: Problem, record: RecordId, model: LinearizedModel | None) -> DeletionTest:
+def _deletion_test(problem: Problem, fit: Identification, record: RecordId) -> DeletionTest:
     """The test of one record, by the model of the fit's records and this one around the fit."""
+    model = model_at(problem, fit.free, fit.active_prior, among={*fit.problem.record_ids, record})
     leg = _inconsistent_leg(problem, record)
     if model is None or record not in model.problem.record_ids:
         return DeletionTest(record, DataFaultKind.MISMATCHED_JOINTS if leg else DataFaultKind.SINGULAR, leg)
-    row = row_of(model.problem, record)
-    statistics = OutlierStatistics.of(model)
+    row, statistics = row_of(model.problem, record), OutlierStatistics.of(model)
     weights, gauges = model.weights[row], model.problem.gauges
     information = gauges.T @ weights @ model.residual_covariance[row] @ weights @ gauges
     offset = -np.linalg.pinv(information, hermitian=True) @ (gauges.T @ model.scores[row])
@@ -133,6 +126,5 @@ def _simplest_cause(offset: Array, readings: Array, information: Array) -> tuple
     along = (information @ offset) ** 2 / np.maximum(np.diag(information), 1e-300)
     worst = int(np.argmax(along))
     others = float(offset @ information @ offset - along[worst])
-    return DataFaultKind.GROSS_ERROR, GAUGES[worst] if others < chi_square_limit(
-        2, CAUSE_PROBABILITY
-    ) else ""
+    is_alone = others < chi_square_limit(2, CAUSE_PROBABILITY)
+    return DataFaultKind.GROSS_ERROR, GAUGES[worst] if is_alone else ""

@@ -177,12 +177,9 @@ def rank_hypotheses(
 ) -> list[FaultHypothesis]:
     """What may significantly be wrong with the records of a problem, the most likely first.
 
-    Args:
-        problem: n records.
-        fit: of those of them that the solver could use.
-        found_before: how many gross errors were found before.
-        is_trusted: whether tests around the solution are valid. Where they are not, the most likely gauge
-            faults around the drawing come in turns with the hypotheses around the solution.
+    The ``fit`` is of those that the solver could use, and so many gross errors were ``found_before``. Where
+    tests around the solution are not to be trusted, the most likely gauge faults around the drawing come in
+    turns with the hypotheses around the solution.
     """
     model, goodness = fit.linear_model, fit.noise_test
     around_drawing: list[GaugeFaultHypothesis] = []
@@ -228,10 +225,8 @@ def _known_change_gains(model: LinearizedModel, change: Array) -> tuple[Array, f
     """
     problem, weights = model.problem, model.weights
     weighted = np.einsum("nij,nj->ni", weights, change)
-    constants = np.linalg.solve(problem.group_sums(weights), problem.group_sums(weighted)[..., None])[
-        ..., 0
-    ]
-    centred = change - problem.per_record(constants)
+    constants = np.linalg.solve(problem.group_sums(weights), problem.group_sums(weighted)[..., None])
+    centred = change - problem.per_record(constants[..., 0])
     score = problem.group_sums(np.sum(change * model.scores, axis=-1))
     squares = problem.group_sums(np.sum(centred * weighted, axis=-1))
     by_parameters = problem.group_sums(np.einsum("nip,ni->np", model.jacobian, weighted))

@@ -40,14 +40,8 @@ def model_at(
 ) -> LinearizedModel | None:
     """The linear model around a geometry of the records that have poses there, clear of singularities.
 
-    Args:
-        problem: the records.
-        free: parameters (p,) of the geometry, mm.
-        active_prior: precision (p, p), 1/mm^2, of the prior where it was not released.
-        among: the records that count; None: all.
-
-    Returns:
-        The model; None if no record is left.
+    ``free`` (p,), mm, are the parameters of the geometry, and ``active_prior`` (p, p), 1/mm^2, is the
+    precision of the prior where it was not released. None if no record is left ``among`` those that count.
     """
     started = problem.started_at(free)
     usable = started.has_start_pose if among is None else started.has_start_pose & problem.mask_of(among)

@@ -50,7 +50,7 @@ from hexacell.identification.data_faults.hypotheses import (
 )
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareTest
-from hexacell.identification.solver.fit import COARSE
+from hexacell.identification.solver.fit import COARSE, QUICK, fit_regularized
 from hexacell.identification.solver.multistart import restarts
 from hexacell.identification.solver.result import Identification
 from hexacell.measurements.records import RecordId
@@ -113,23 +113,17 @@ class Selection:
     @classmethod
     def of_all(cls, problem: Problem) -> Selection:
         """The fit of all records as measured, whatever is wrong with them."""
-        return cls(CorrectedFit.fitted(problem, problem, options=COARSE), {})
+        return cls(CorrectedFit.uncorrected(problem, COARSE), {})
 
 
 def select_faults(problem: Problem, fit: Identification | None = None) -> Selection:
-    """Fit a problem, corrected for all faults that are found and proven.
-
-    Args:
-        problem: all records, at least as many as determine the parameters.
-        fit: the quick fit of them, if it is known.
+    """Fit a problem, corrected for all faults that are found and proven, from a quick fit of it.
 
     Raises:
         UncorrectableFaultError: a gauge fault, or a zero shift that leaves too few records.
     """
     try:
-        uncorrected = (
-            CorrectedFit.uncorrected(problem) if fit is None else CorrectedFit(problem, problem, fit)
-        )
+        uncorrected = CorrectedFit(problem, problem, fit or fit_regularized(problem, QUICK))
         selected = _forward(uncorrected)
         if len(selected.rejected) > 1 or not selected.is_consistent:
             # Readings in inches resemble a machine that needs no calibration, with some gross errors.
@@ -170,10 +164,8 @@ def confirmed_by_refit(current: CorrectedFit, hypothesis: FaultHypothesis) -> Co
     must have a sufficient part of the first-order gain, and be a proof: it agrees with the noise, or is
     better by far.
     """
-    if (
-        isinstance(hypothesis, OutlierHypothesis)
-        and not hypothesis.corrected(current.problem).is_determined
-    ):
+    is_outlier = isinstance(hypothesis, OutlierHypothesis)
+    if is_outlier and not hypothesis.corrected(current.problem).is_determined:
         return None
     corrected = refitted(current, hypothesis)
     if corrected is None or not isinstance(hypothesis, GaugeFaultHypothesis):
@@ -218,11 +210,9 @@ def _searched(current: CorrectedFit) -> CorrectedFit | None:
     for candidate in _candidates(current):
         if isinstance(candidate, CorrectedFit):
             trial: CorrectedFit | None = candidate
-        elif candidate in tried:
-            continue
         else:
+            trial = None if candidate in tried else refitted(current, candidate)
             tried.add(candidate)
-            trial = refitted(current, candidate)
         if trial is None:
             continue
         if trial.settles(current):
@@ -252,8 +242,7 @@ def _greedy_deletion(start: CorrectedFit) -> CorrectedFit:
     while found < LARGEST_REJECTED_SHARE * start.problem.records and not now.is_consistent:
         hypotheses = now.likely_hypotheses()
         removing = (one for one in hypotheses if not isinstance(one, GaugeFaultHypothesis))
-        trials = (refitted(now, hypothesis) for hypothesis in removing)
-        trial = next((trial for trial in trials if trial is not None), None)
+        trial = next(filter(None, (refitted(now, hypothesis) for hypothesis in removing)), None)
         if trial is None:
             break
         now, found = trial, found + 1

@@ -161,15 +161,10 @@ class FrameChoice:
 def choose_frames(
     mechanism: Mechanism, branch: Branch, *, taught: Geometry, new: Geometry, poses: PoseBatch
 ) -> FrameChoice:
-    """The frames in which the ``new`` geometry moves n taught poses least.
+    """The frames in which the ``new`` geometry, in the frame convention, moves n taught poses least.
 
-    Args:
-        mechanism: of both geometries.
-        branch: of both.
-        taught: the geometry of the time of teaching, in the frames of that time.
-        new: the new geometry, in the mechanism's frame convention.
-        poses: in the frames of ``taught``. If both geometries reach no pose, the frames of ``taught``
-            are kept, as the mechanism's convention has them.
+    The poses are in the frames of the geometry with which they were ``taught``. If both geometries reach no
+    pose, these frames are kept, as the mechanism's convention has them.
     """
     normalized, convention = mechanism.normalize_frames(taught)
     robot = CommandedRobot(mechanism, branch, commanding=normalized, actual=new)

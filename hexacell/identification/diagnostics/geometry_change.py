@@ -20,32 +20,25 @@ STEPS = 5
 def largest_change(
     mechanism: Mechanism, before: Geometry, geometry: Geometry, tolerances: Tolerances
 ) -> float:
-    """The largest change of a parameter from one geometry to another, in the best choice of frames.
+    """The largest change of a parameter from one geometry, in its own frames, to another in the convention.
 
-    Args:
-        mechanism: of both.
-        before: in its own frames.
-        geometry: in the mechanism's frame convention.
-        tolerances: what changes of different parameters are compared by.
-
-    Returns:
-        mm, or mrad of an angle; infinite where the geometry is not a number.
+    In the best choice of frames, by the tolerances; in mm, or mrad of an angle; infinite where the other
+    geometry is not a number.
     """
     if not np.isfinite(geometry.vector).all():
         return float("inf")
     count = len(before.vector)
     fitter = ToleranceFitter(mechanism, before, tolerances, geometry, np.zeros((count, count)))
     frames = mechanism.normalize_frames(before)[1].inverse()
-    ball = before.parameters.ball_offset.T / fitter.widths[:, None] if tolerances.ball_mm else None
-    offset = np.zeros(3)
+    coordinates, turned = 3 if tolerances.ball_mm else 0, len(fitter.frame_columns)
+    ball = (before.parameters.ball_offset.T / fitter.widths[:, None])[:, :coordinates]
+    offset = np.zeros(coordinates)
     for _ in range(STEPS):
-        moving = [fitter.by_frames(frames), *([] if ball is None else [ball])]
-        difference = fitter.difference(frames) + (0.0 if ball is None else ball @ offset)
-        solved = np.linalg.lstsq(np.hstack(moving), -difference, rcond=None)[0]
+        moving, difference = fitter.by_frames(frames), fitter.difference(frames) + ball @ offset
+        solved = np.linalg.lstsq(np.hstack([moving, ball]), -difference, rcond=None)[0]
         step = np.zeros(9)
-        step[fitter.frame_columns] = solved[: len(fitter.frame_columns)] * fitter.frame_scales
-        frames = frames.then(small_change(step))
-        offset = offset if ball is None else offset + solved[-3:]
-    differences = fitter.difference(frames) + (0.0 if ball is None else ball @ offset)
+        step[fitter.frame_columns] = solved[:turned] * fitter.frame_scales
+        frames, offset = frames.then(small_change(step)), offset + solved[turned:]
+    differences = fitter.difference(frames) + ball @ offset
     changes = differences * fitter.widths / before.parameters.like_a_mm
     return float(np.abs(changes).max())

@@ -30,14 +30,9 @@ class PointPrediction:
 
 
 def update(found: Identification, further: Problem) -> Identification:
-    """Estimate by the records of an identification and further ones.
+    """Estimate by the records of an identification and ``further`` ones at other points, with one prior.
 
-    Args:
-        found: the identification; its prior, where it was not released, counts again.
-        further: records at other points, with the same prior.
-
-    Returns:
-        The estimate by all records that have a pose under it.
+    The prior counts where it was not released before. The estimate is by all records with a pose under it.
 
     Raises:
         IdentifiabilityError: no geometry fits any of the further records; they would prove nothing.
@@ -58,8 +53,7 @@ def update(found: Identification, further: Problem) -> Identification:
 
 def prediction_test(found: Identification, rows: Mask) -> ChiSquareTest:
     """The chi-square of some ``rows`` (n,) of the records, against what the others predict of them."""
-    costs = LinearCosts.at(found.problem, found.prediction)
-    return _prediction_test(costs, rows)
+    return _prediction_test(LinearCosts.at(found.problem, found.prediction), rows)
 
 
 def leave_one_point_out(found: Identification) -> tuple[PointPrediction, ...]:

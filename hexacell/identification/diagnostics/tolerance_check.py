@@ -95,13 +95,8 @@ def tolerance_violations(
 ) -> tuple[ToleranceViolation, ...]:
     """The parameters outside their tolerance in every choice of frames; empty for a robot built as drawn.
 
-    Where the estimate is not a number, all of them are outside.
-
-    Args:
-        found: the identified geometry, in the mechanism's frame convention.
-        mechanism: of both.
-        drawing: in the frames in which its tolerances hold.
-        tolerances: of the drawing.
+    Where the estimate, in the frame convention, is not a number, all of them are outside. The drawing is in
+    the frames in which its tolerances hold.
     """
     frames = mechanism.normalize_frames(drawing)[1].inverse()
     fitter = ToleranceFitter(mechanism, drawing, tolerances, found.geometry, found.covariance)
@@ -135,10 +130,8 @@ def _named(fitter: ToleranceFitter, fit: ToleranceFit) -> tuple[ToleranceViolati
 
 def _pressing(fitter: ToleranceFitter, fit: ToleranceFit) -> list[Joint]:
     """Joints whose tolerances hold the fit, those that hold most first."""
-    pressures: dict[Joint, float] = {}
-    for parameter, pressure in zip(
-        fitter.drawing.parameters.parameters, fit.pressure.tolist(), strict=True
-    ):
+    pressures, parameters = dict[Joint, float](), fitter.drawing.parameters.parameters
+    for parameter, pressure in zip(parameters, fit.pressure.tolist(), strict=True):
         joint = parameter.kind, parameter.leg
         pressures[joint] = float(np.hypot(pressures.get(joint, 0.0), pressure))
     held = [joint for joint, pressure in pressures.items() if pressure > 0.0]

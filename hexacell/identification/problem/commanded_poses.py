@@ -27,7 +27,6 @@ from hexacell.kinematics.rotations import Array, Mask
 SAME_GEOMETRY_STAGES = (1, *CONTINUATION_STAGES)
 """Continuation stages under the commanding geometry: the joint variables are near the commanded ones."""
 
-
 ACCEPTED_MM = 1.0
 """Differences of joint variables from the commanded ones up to this are normal on any machine."""
 
@@ -83,9 +82,8 @@ class CommandedPoses:
         """Attribute poses, as sent, to candidate geometries by the measured joint variables (n, 6), mm."""
         poses = [candidate.frames.poses(commands) for candidate in candidates]
         geometries = [candidate.geometry for candidate in candidates]
-        computed = np.stack(
-            [mechanism.inverse(one, branch, at) for one, at in zip(geometries, poses, strict=True)]
-        )
+        pairs = zip(geometries, poses, strict=True)
+        computed = np.stack([mechanism.inverse(geometry, branch, at) for geometry, at in pairs])
         distance = np.abs(np.nan_to_num(computed - measured, nan=np.inf)).max(axis=-1)
         choice, rows = np.argmin(distance, axis=0), np.arange(len(commands))
         chosen = PoseBatch(
@@ -162,12 +160,6 @@ def require_consistent_encoders(
     the larger change of q at the two ends of the tolerance. A few inconsistent records are accepted; the
     search for data faults names them.
 
-    Args:
-        commands: of the records.
-        measured: joint variables (n, 6), mm.
-        labels: point and orientation (n, 2).
-        prior: the drawing and its tolerances.
-
     Raises:
         IdentifiabilityError: names the first record and its worst leg, and the columns that look exchanged,
             if any.
@@ -194,8 +186,7 @@ def require_consistent_encoders(
 
 def _is_small_share(legs: Mask) -> bool:
     """Whether any leg (n, 6) is concerned in few of n records only."""
-    records = np.logical_or.reduce(legs, axis=-1)
-    return bool(np.count_nonzero(records) <= MAX_OUTLIER_SHARE * len(records))
+    return bool(np.count_nonzero(legs.any(axis=-1)) <= MAX_OUTLIER_SHARE * len(legs))
 
 
 def _explained_by_tolerances(commands: CommandedPoses, prior: Prior) -> Array:
@@ -226,8 +217,7 @@ def _advice(commands: CommandedPoses, measured: Array, explained: Array) -> str:
     if not _is_small_share(difference > explained):
         return "Check that q1 to q6 are in the row of their pose, in mm, and which config commanded it"
     moved = [leg for leg in range(LEGS) if columns[leg] != leg]
-    names, sources = (
-        ", ".join(f"q{leg + 1}" for leg in legs) for legs in (moved, [columns[leg] for leg in moved])
-    )
+    names = ", ".join(f"q{leg + 1}" for leg in moved)
+    sources = ", ".join(f"q{columns[leg] + 1}" for leg in moved)
     joint = commands.mechanism.words.joint
     return f"The columns {names} look like those of {sources}: check which encoder is on which {joint}"

@@ -89,10 +89,7 @@ class Noise:
         return np.asarray(scaled @ np.swapaxes(scaled, -1, -2))
 
     def chance_covariance(self, position_by_joints: Array) -> Array:
-        """Covariance (n, 3, 3), mm^2, of what the gauges show at a commanded pose, by ``dP/dq`` (n, 3, 6).
-
-        By where the joints stop, whether their encoders see it or not, and by the gauges' noise.
-        """
+        """Covariance (n, 3, 3), mm^2, of what the gauges show at a commanded pose: by stops and noise."""
         return self.stop_covariance(position_by_joints) + self.record_covariance(position_by_joints)
 
     def stop_covariance(self, position_by_joints: Array) -> Array:
@@ -155,8 +152,7 @@ class Prior:
 
     Attributes:
         centre: the drawing, in the mechanism's frame convention.
-        free: its free parameters (p,), mm.
-        covariance: (p, p) of the free parameters, mm^2.
+        free: its free parameters (p,), mm; ``covariance`` (p, p) of these, mm^2.
         tolerance_sigma: (p,) their standard deviations by their own tolerances, mm, without those of the
             parameters that define the frames; None where the prior is no drawing.
         is_estimate: whether it is an earlier estimate, with what may have drifted since.
@@ -177,10 +173,9 @@ class Prior:
         """
         centre, _ = mechanism.normalize_frames(drawing)
         by_parameters = free_parameter_derivatives(mechanism, drawing)
-        by_ball = mechanism.parameters.ball_offset @ by_parameters
-        widths = tolerances.widths(mechanism.parameters)[:, None]
-        factor = np.vstack([widths * by_parameters, tolerances.ball_mm * by_ball])
-        own = np.vstack([np.diag(widths[:, 0]), tolerances.ball_mm * mechanism.parameters.ball_offset])
+        ball, widths = mechanism.parameters.ball_offset, tolerances.widths(mechanism.parameters)
+        factor = np.vstack([widths[:, None] * by_parameters, tolerances.ball_mm * (ball @ by_parameters)])
+        own = np.vstack([np.diag(widths), tolerances.ball_mm * ball])
         own_sigma = np.linalg.norm(own, axis=0)[mechanism.convention.free_rows] / np.sqrt(3.0)
         free = mechanism.convention.free_parameters(centre)
         return cls(centre, free, factor.T @ factor / 3.0, own_sigma)
@@ -204,9 +199,8 @@ class Prior:
 
     def leg_widths(self, mechanism: Mechanism) -> Array:
         """The largest tolerances (c,) of the numbers of one leg, the ball's offset included."""
-        widths = np.zeros(len(mechanism.parameters))
+        parameters, widths = mechanism.parameters, np.zeros(len(mechanism.parameters))
         widths[mechanism.convention.free_rows] = np.sqrt(3.0 * np.diag(self.covariance))
-        parameters = mechanism.parameters
         largest = [parameters.array(widths, kind.symbol).max() for kind in parameters.kinds]
         return np.repeat(largest, [kind.numbers_per_leg for kind in parameters.kinds])
 
@@ -237,10 +231,9 @@ class IdentifiedBefore:
 
 
 def drift_covariance(mechanism: Mechanism, geometry: Geometry, sigma: Array) -> Array:
-    """Covariance (p, p) of the free parameters when all parameters change independently.
+    """Covariance (p, p) of the free parameters when all parameters change, with ``sigma`` (P,) each.
 
-    Every parameter (P,) of the machine changes, with standard deviations ``sigma``, those that the frame
-    convention fixes as well: the convention then moves the others. ``geometry`` is in that convention.
+    Those that the frame convention of the ``geometry`` fixes change as well, and it then moves the others.
     """
     factor = sigma[:, None] * free_parameter_derivatives(mechanism, geometry)
     return np.asarray(factor.T @ factor)

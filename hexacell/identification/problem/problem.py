@@ -20,7 +20,7 @@ from hexacell.identification.problem.commanded_poses import (
     require_consistent_encoders,
 )
 from hexacell.identification.problem.prior import Noise, Prior, SystematicModel, no_systematic_errors
-from hexacell.identification.terms.taken import TakenTerms
+from hexacell.identification.terms.taken import TakenTerms, mean_of
 from hexacell.identification.terms.term import ModelTerm
 from hexacell.identification.thermal_expansion import ThermalExpansion
 from hexacell.kinematics.forward import ForwardResult
@@ -190,10 +190,7 @@ class Problem:
         return values[self.stations]
 
     def starting_at(self, free: Array, poses: PoseBatch, has_start_pose: Mask | None = None) -> Problem:
-        """The problem with another start: free parameters (p,), mm, and poses that close them.
-
-        The poses are those of all records, or of some (n,).
-        """
+        """The problem that starts at free parameters (p,), mm, and poses of all or of some records (n,)."""
         known = np.ones(self.records, dtype=bool) if has_start_pose is None else has_start_pose
         return replace(self, initial_parameters=free, start=poses, has_start_pose=known)
 
@@ -238,7 +235,6 @@ class Problem:
         """
         labels = np.concatenate([self.labels, other.labels])
         order = np.argsort(labels[:, 0], kind="stable")
-        commands = self.commands.joined(other.commands)
         terms = self.terms
         if terms is not None and other.terms is not None:
             terms = terms.joined(other.terms)[order]
@@ -249,7 +245,7 @@ class Problem:
             directions=np.concatenate([self.directions, other.directions])[order],
             warmer=np.concatenate([self.warmer, other.warmer])[order],
             first_rows=first_rows_of(labels[order, 0]),
-            commands=commands[order],
+            commands=self.commands.joined(other.commands)[order],
             start=PoseBatch.joined([self.start, other.start])[order],
             has_start_pose=np.concatenate([self.has_start_pose, other.has_start_pose])[order],
             labels=labels[order],
@@ -290,13 +286,11 @@ class Assumptions:
     expansion: ThermalExpansion = field(default_factory=ThermalExpansion)
 
     def problem(self, measurements: MeasurementSet, known: Problem | None = None) -> Problem:
-        """The problem of a measurement set.
+        """The problem of a measurement set, in any order, from the ``known`` one of some of its records.
 
-        Args:
-            measurements: n records in any order.
-            known: the problem of some of these records. A record does not change how those before it were
-                commanded, nor their start poses; these are taken over and computed for the new records
-                alone, unless it changes what is known of the temperatures before it.
+        A record does not change how those before it were commanded, nor their start poses; these are taken
+        over and computed for the new records alone, unless it changes what is known of the temperatures
+        before it.
 
         Raises:
             IdentifiabilityError: joint variables do not belong to the commanded poses, or for most records
@@ -357,7 +351,7 @@ class Assumptions:
         )
         if not self.known_terms:
             return made
-        return made.with_terms(self.known_terms, np.concatenate([term.mean for term in self.known_terms]))
+        return made.with_terms(self.known_terms, mean_of(self.known_terms))
 
 
 def _interleaved(known: Values, rows: NDArray[np.intp], new: Values) -> Values:

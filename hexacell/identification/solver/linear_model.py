@@ -57,13 +57,7 @@ class LinearizedModel:
 
     @classmethod
     def around(cls, problem: Problem, prediction: Prediction, active_prior: Array) -> LinearizedModel:
-        """Linearize around any geometry.
-
-        Args:
-            problem: the n records.
-            prediction: of them by that geometry.
-            active_prior: precision (p, p), 1/mm^2, of the prior where it was not released.
-        """
+        """Linearize at any geometry, with the precision (p, p), 1/mm^2, of what is kept of the prior."""
         elimination = NuisanceElimination(problem, prediction.weights)
         system = elimination.system(prediction.residuals, prediction.jacobian)
         covariance = np.linalg.inv(system.information() + active_prior)
@@ -129,12 +123,8 @@ class LinearCosts:
 
     def least(self, rows: Mask) -> float:
         """The least cost of some records (n,), the full prior included."""
-        prior = self.problem.prior
-        system, values = self._system(rows)
-        factor = np.linalg.cholesky(prior.precision).T
-        both = np.concatenate([system, self._only_parameters(factor)])
-        from_centre = factor @ (self.prediction.free - prior.free)
-        return _least_squares(both, np.concatenate([values, from_centre]))[1]
+        (system, values), (of_prior, from_centre) = self._system(rows), self._full_prior
+        return _least_squares(np.vstack([system, of_prior]), np.concatenate([values, from_centre]))[1]
 
     def with_causes(self, columns: Array) -> LinearCosts:
         """These records with further errors (n, 3, k), mm, that they share, each of unit variance."""
@@ -146,14 +136,10 @@ class LinearCosts:
         Parameters and causes are integrated out. The constant is that of the records and their noise, whose
         variances are ``scale`` times as large as stated.
         """
-        prior = self.problem.prior
-        system, values = self._system(rows)
-        factor = np.linalg.cholesky(prior.precision).T
-        whitened = len(system) - self.common.shape[-1]
+        (system, values), (of_prior, from_centre) = self._system(rows), self._full_prior
         size = np.ones(len(system))
-        size[:whitened] /= np.sqrt(scale)
-        both = np.concatenate([size[:, None] * system, self._only_parameters(factor)])
-        from_centre = factor @ (self.prediction.free - prior.free)
+        size[: len(system) - self.common.shape[-1]] /= np.sqrt(scale)
+        both = np.concatenate([size[:, None] * system, of_prior])
         every = np.concatenate([size * values, from_centre])
         normal, gradient = both.T @ both, both.T @ every
         cost = float(every @ every - gradient @ np.linalg.solve(normal, gradient))
@@ -164,8 +150,8 @@ class LinearCosts:
         system, values = self._system(np.ones(self.problem.records, dtype=bool))
         eigenvalues, vectors = np.linalg.eigh(active_prior)  # which may be singular
         factor = np.sqrt(np.maximum(eigenvalues, 0.0))[:, None] * vectors.T
-        both = np.concatenate([system, self._only_parameters(factor)])
-        from_centre = factor @ (self.prediction.free - self.problem.prior.free)
+        rows_of_prior, from_centre = self._prior(factor)
+        both = np.concatenate([system, rows_of_prior])
         step, cost = _least_squares(both, np.concatenate([values, from_centre]))
         of_prior = from_centre + factor @ step[: len(self.prediction.free)]
         covariance = np.linalg.inv(both.T @ both)[: len(step) - self.common.shape[-1]]
@@ -187,9 +173,14 @@ class LinearCosts:
         unit = np.eye(jacobian.shape[-1])[jacobian.shape[-1] - causes :]
         return np.concatenate([system.rows, unit]), np.concatenate([system.values, np.zeros(causes)])
 
-    def _only_parameters(self, factor: Array) -> Array:
-        """Rows that do not depend on the causes."""
-        return np.pad(factor, ((0, 0), (0, self.common.shape[-1])))
+    @property
+    def _full_prior(self) -> tuple[Array, Array]:
+        return self._prior(np.linalg.cholesky(self.problem.prior.precision).T)
+
+    def _prior(self, factor: Array) -> tuple[Array, Array]:
+        """Rows and values of a prior by a factor of its precision; they do not depend on the causes."""
+        rows = np.pad(factor, ((0, 0), (0, self.common.shape[-1])))
+        return rows, factor @ (self.prediction.free - self.problem.prior.free)
 
 
 def systematic_errors(problem: Problem, prediction: Prediction) -> SystematicErrors:

@@ -64,13 +64,9 @@ class Prediction:
 
 
 def predict(problem: Problem, free: Array, poses: PoseBatch, mode: Array | None = None) -> Prediction:
-    """Linearize the measurement model.
+    """Linearize the measurement model at free parameters (p,), mm, and the poses that close their geometry.
 
-    Args:
-        problem: n records.
-        free: (p,) free parameters, mm.
-        poses: that close their geometry at the joint variables of the records.
-        mode: the assembly mode (n,) of the poses, if it is known.
+    ``mode`` (n,) is the assembly mode of the poses, if it is known.
     """
     geometry = problem.geometry(free)
     sensitivity = free_sensitivity(problem.mechanism, geometry, poses, problem.joints)
@@ -159,9 +155,7 @@ class NuisanceElimination:
 
     def __init__(self, problem: Problem, weights: Array) -> None:
         noise = problem.noise
-        self.problem = problem
-        self._weights = weights
-        self._stations = problem.stations
+        self.problem, self._weights, self._stations = problem, weights, problem.stations
         self._turns = noise.alignment > 0.0
         self._design: Array = np.broadcast_to(np.eye(3), (problem.records, 3, 3))  # by c, and by w
         if self._turns:
@@ -208,8 +202,8 @@ class NuisanceElimination:
 
     def nuisance_covariance(self) -> Array:
         """Covariance (n, 3, 3), mm^2, of what is subtracted from each record."""
-        spread = self._station_covariance[self._stations]
-        taken = self._design @ spread @ np.swapaxes(self._design, -1, -2)
+        spread, design = self._station_covariance[self._stations], self._design
+        taken = design @ spread @ np.swapaxes(design, -1, -2)
         if len(self._sigmas):
             design = self._common_design
             taken = taken + design @ self.common_covariance @ np.swapaxes(design, -1, -2)

@@ -8,7 +8,7 @@ import numpy as np
 
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.measurement_model import NuisanceElimination, Prediction
-from hexacell.identification.terms.taken import TakenTerms, spread_of
+from hexacell.identification.terms.taken import TakenTerms, mean_of, spread_of
 from hexacell.identification.terms.term import ModelTerm
 from hexacell.kinematics.corrections import Corrections
 from hexacell.kinematics.parameters import LEGS
@@ -34,35 +34,21 @@ class TermEstimates:
     def at(
         cls, problem: Problem, taken: TakenTerms, prediction: Prediction, covariance: Array
     ) -> TermEstimates:
-        """The best coefficients at a minimum of the cost.
-
-        Args:
-            problem: the records.
-            taken: the terms that they have.
-            prediction: of the records at the minimum.
-            covariance: of the free parameters there (p, p), mm^2.
-        """
+        """The best coefficients at a minimum, where the free parameters have a covariance (p, p), mm^2."""
         elimination = NuisanceElimination(problem, prediction.weights)
         causes = taken.columns.shape[-1]
         values = elimination.common(prediction.residuals[..., None])[-causes:, 0]
         # With other parameters, other coefficients are best.
         by_parameters = elimination.common(prediction.jacobian)[-causes:]
-        own = elimination.common_covariance[-causes:, -causes:]
-        crossed = by_parameters @ covariance
-        spread = spread_of(taken.terms)
-        mean = np.concatenate([term.mean for term in taken.terms])
-        return cls(
-            taken.terms,
-            mean + spread @ values,
-            spread @ (own + crossed @ by_parameters.T) @ spread.T,
-            spread @ crossed,
-        )
+        crossed, spread = by_parameters @ covariance, spread_of(taken.terms)
+        own = elimination.common_covariance[-causes:, -causes:] + crossed @ by_parameters.T
+        best = mean_of(taken.terms) + spread @ values
+        return cls(taken.terms, best, spread @ own @ spread.T, spread @ crossed)
 
     @classmethod
     def expected(cls, terms: tuple[ModelTerm, ...], parameters: int) -> TermEstimates:
         """What is known of terms before records, beside a number of free parameters."""
-        spread = spread_of(terms)
-        mean = np.concatenate([term.mean for term in terms])
+        spread, mean = spread_of(terms), mean_of(terms)
         return cls(terms, mean, spread @ spread.T, np.zeros((len(mean), parameters)))
 
     def beside_encoders(self, directions: Array) -> Array:

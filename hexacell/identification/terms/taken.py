@@ -52,14 +52,12 @@ class TakenTerms:
             deviations=records.deviations[known],
             directions=records.directions[known],
         )
-        mean = np.concatenate([np.zeros(0), *(term.mean for term in terms)])
+        mean = mean_of(terms)
         by_coefficients = np.zeros((len(records), 3, LEGS * len(terms)))
         offset = np.zeros((len(records), 3))
         if values is not None:
-            undeformed = some
-            some = deformed(terms, some, values)
-            offset[known] = some.poses.positions - undeformed.poses.positions
-            mean = mean - values
+            positions, some = some.poses.positions, deformed(terms, some, values)
+            offset[known], mean = some.poses.positions - positions, mean - values
         for row, term in enumerate(terms):
             columns = slice(row * LEGS, (row + 1) * LEGS)
             by_coefficients[known, :, columns] = term.pose_errors(some, some.directions)[:, :3]
@@ -68,8 +66,7 @@ class TakenTerms:
         return cls(terms, by_coefficients @ spread_of(terms), offset + by_coefficients @ mean, unknown)
 
     def __getitem__(self, rows: Mask | NDArray[np.intp]) -> TakenTerms:
-        parts = self.columns[rows], self.offset[rows], self.unknown[rows]
-        return TakenTerms(self.terms, *parts)
+        return TakenTerms(self.terms, self.columns[rows], self.offset[rows], self.unknown[rows])
 
     def joined(self, other: TakenTerms) -> TakenTerms:
         """The same terms at both sets of records."""
@@ -107,6 +104,11 @@ def deformed(terms: tuple[ModelTerm, ...], records: RecordPlacement, values: Arr
         poses = records.poses.with_rows(kept, solved.poses[kept])
         at = replace(records, poses=poses, joints=np.where(kept[:, None], joints, records.joints))
     return at
+
+
+def mean_of(terms: tuple[ModelTerm, ...]) -> Array:
+    """(6 m,) coefficients of all m terms as they are expected."""
+    return np.concatenate([np.zeros(0), *(term.mean for term in terms)])
 
 
 def spread_of(terms: tuple[ModelTerm, ...]) -> Array:

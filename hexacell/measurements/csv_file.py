@@ -39,15 +39,10 @@ LARGEST_FILE_BYTES = 5_000_000
 
 
 def read_measurements(path: Path, *, allow_partial: bool = False) -> MeasurementSet:
-    """Read a measurement file.
+    """Read a measurement file: the records in the order of the rows.
 
-    Args:
-        path: the file, CSV.
-        allow_partial: accept the file of an unfinished calibration: without rows, or even without a header,
-            and with one row at a point.
-
-    Returns:
-        The records in the order of the rows: joints in mm or deg, deviations in mm, poses in mm and deg.
+    With ``allow_partial`` it may be the file of an unfinished calibration: without rows, or even without a
+    header, and with one row at a point.
 
     Raises:
         FileError: the file cannot be read, a column is missing, a cell is not a number, a record occurs
@@ -62,12 +57,9 @@ def read_measurements(path: Path, *, allow_partial: bool = False) -> Measurement
     rows = Counter(point for point, _ in records)
     for (point, _), (line, _) in records.items():
         if rows[point] < 2 and not allow_partial:
-            raise FileError(
-                f"point {point} has one row, and at least two are needed to compare",
-                subject=path,
-                line=line,
-                action="Measure it in another orientation, or remove the row",
-            )
+            problem = f"point {point} has one row, and at least two are needed to compare"
+            action = "Measure it in another orientation, or remove the row"
+            raise FileError(problem, subject=path, line=line, action=action)
     return MeasurementSet(tuple(record for _, record in records.values()))
 
 
@@ -113,21 +105,14 @@ def _records(path: Path, text: str, wanted: tuple[str, ...]) -> dict[RecordId, t
         cells = {name: row[column] for name, column in zip(wanted, columns, strict=True)}
         record = _record(path, line, cells)
         if record.id in found:
-            raise FileError(
-                f"point {record.point}, orientation {record.orientation} is here and in line "
-                f"{found[record.id][0]}",
-                subject=path,
-                line=line,
-                action="Remove one of the two rows",
-            )
+            where, other = f"point {record.point}, orientation {record.orientation}", found[record.id][0]
+            problem = f"{where} is here and in line {other}"
+            raise FileError(problem, subject=path, line=line, action="Remove one of the two rows")
         found[record.id] = (line, record)
         if len(found) > MOST_RECORDS:
-            raise FileError(
-                f"there are more than {MOST_RECORDS} records",
-                subject=path,
-                line=line,
-                action="Split the file; some 60 records identify a robot",
-            )
+            action = "Split the file; some 60 records identify a robot"
+            problem = f"there are more than {MOST_RECORDS} records"
+            raise FileError(problem, subject=path, line=line, action=action)
     return found
 
 
@@ -167,9 +152,9 @@ def _record(path: Path, line: int, cells: Mapping[str, str]) -> Record:
     numbers = [_number(path, line, name, cells.get(name, "0")) for name in HEADER]
     point, orientation = int(numbers[0]), int(numbers[1])
     q1, q2, q3, q4, q5, q6, dx, dy, dz = numbers[8:]
-    joints, directions = (q1, q2, q3, q4, q5, q6), _directions(path, line, cells)
-    temperatures = _temperatures(path, line, cells)
-    return Record(point, orientation, Pose(*numbers[2:8]), joints, (dx, dy, dz), directions, temperatures)
+    joints, deviation = (q1, q2, q3, q4, q5, q6), (dx, dy, dz)
+    further = _directions(path, line, cells), _temperatures(path, line, cells)
+    return Record(point, orientation, Pose(*numbers[2:8]), joints, deviation, *further)
 
 
 def _directions(path: Path, line: int, cells: Mapping[str, str]) -> Directions:

@@ -118,7 +118,7 @@ class MeasurementSet:
     @cached_property
     def group(self) -> NDArray[np.intp]:
         """The point (n,) of each record, numbered 0 to m-1 in the order of first appearance."""
-        places = {point: place for place, point in enumerate(dict.fromkeys(self.points.tolist()))}
+        places = {point: place for place, point in enumerate(self.counts)}
         return _frozen(np.array([places[record.point] for record in self.records], dtype=np.intp))
 
     @cached_property
@@ -140,8 +140,7 @@ class MeasurementSet:
     @cached_property
     def directions(self) -> Array:
         """From which side each joint arrived (n, 6): 1 from below, -1 from above, 0 where not known."""
-        unknown = (0,) * 6
-        rows = [record.directions or unknown for record in self.records]
+        rows = [record.directions or (0,) * 6 for record in self.records]
         return _frozen(np.array(rows, dtype=float).reshape(-1, 6))
 
     @cached_property

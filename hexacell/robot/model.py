@@ -101,9 +101,7 @@ class Robot:
     @cached_property
     def commanding(self) -> Geometry:
         """The geometry that the controller commands with now, in the frame convention."""
-        if self.uses_provisional:
-            return self.provisional[-1]
-        return self._commanding_as_written.geometry
+        return self.provisional[-1] if self.uses_provisional else self._commanding_as_written.geometry
 
     @property
     def free_parameters(self) -> Array:
@@ -117,9 +115,7 @@ class Robot:
     @cached_property
     def prior(self) -> Prior:
         """What is known before measuring."""
-        if self.known is not None:
-            return self.known
-        return Prior.of(self.mechanism, self.drawing, self.tolerances)
+        return self.known or Prior.of(self.mechanism, self.drawing, self.tolerances)
 
     def tolerance_violations(self, found: GeometryEstimate) -> tuple[ToleranceViolation, ...]:
         """The parameters of an estimate that are outside the drawing's tolerances."""
@@ -131,9 +127,7 @@ class Robot:
 
     def identified_zeros(self, found: Identification) -> IdentifiedZeros | None:
         """The zeros by an identification's records, where these alone are identified."""
-        if self.identifies is ParameterChoice.ALL:
-            return None
-        return IdentifiedZeros.of(found, self.controller)
+        return None if self.held is None else IdentifiedZeros.of(found, self.controller)
 
     @cached_property
     def held(self) -> HeldParameters | None:
@@ -145,9 +139,8 @@ class Robot:
     @cached_property
     def unknowns(self) -> int:
         """How many parameters are identified."""
-        if self.identifies is ParameterChoice.ALL:
-            return len(self.mechanism.convention.free_names)
-        return int(zero_columns(self.mechanism, self.controller).shape[1])
+        names = self.mechanism.convention.free_names
+        return len(names) if self.held is None else int(self.held.columns.shape[1])
 
     def problem(self, measurements: MeasurementSet, before: Problem | None = None) -> Problem:
         """The identification problem of records that were commanded with the controller's geometries.
@@ -174,12 +167,11 @@ class Robot:
 
     def belief(self, identified: Identification | None = None) -> RobotBelief:
         """What is known of the robot: by an identification, or by its drawing alone."""
-        prior = self.prior
-        free, covariance, terms = prior.free, prior.covariance, None
-        if identified is None and self.known_terms:
-            terms = TermEstimates.expected(self.known_terms, len(free))
+        free, covariance, terms = self.prior.free, self.prior.covariance, None
         if identified is not None:
             free, covariance, terms = identified.free, identified.free_covariance, identified.terms
+        elif self.known_terms:
+            terms = TermEstimates.expected(self.known_terms, len(free))
         return RobotBelief(
             self.mechanism,
             self.commanding,

@@ -5,6 +5,7 @@ more, another unit, or another order of the legs, may explain it: then that is w
 """
 
 from collections.abc import Iterator
+from functools import partial
 from itertools import permutations
 from pathlib import Path
 
@@ -63,12 +64,10 @@ def require_same_robot(cell: Cell, drawing: Geometry, controller: Geometry) -> N
     is_another = largest > FARTHEST_DRAWING * np.abs(commanding).max()
     if not is_another and largest <= usual:
         return
-    line = cell.document.line_of(("robot", "nominal"))
+    refused = partial(FileError, subject=cell.path, line=cell.document.line_of(("robot", "nominal")))
     if (order := _other_order(mechanism, drawing, controller, min(usual, largest / 4.0))) is not None:
-        raise FileError(
+        raise refused(
             f"the legs are in another order than in {cell.config_path}: {order}",
-            subject=cell.path,
-            line=line,
             action="List the legs in the same order in both files: leg 1 is that of encoder 1",
         )
     if not is_another:
@@ -77,28 +76,23 @@ def require_same_robot(cell: Cell, drawing: Geometry, controller: Geometry) -> N
         for scaled, whose in ((drawn, "[robot.nominal]"), (commanding, str(cell.config_path))):
             other = commanding if scaled is drawn else drawn
             if abs(np.linalg.norm(scaled) * size_mm / np.linalg.norm(other) - 1.0) < SAME_SHARE:
-                raise FileError(
+                raise refused(
                     f"the lengths in {whose} look like {unit}: in the other file they are {size_mm:g} "
                     "times as large",
-                    subject=cell.path,
-                    line=line,
                     action="Write millimetres, or state unit_mm in [controller.config_options]",
                 )
     parameter = parameters.parameters[worst]
     name, unit = mechanism.convention.display_name(parameter.name), parameter.kind.unit.shown
-    raise FileError(
+    raise refused(
         f"the drawing is not of the robot in {cell.config_path}: {name} differs by {largest:.4g} {unit} "
         "once both are in the same frames",
-        subject=cell.path,
-        line=line,
         action="Correct [robot.nominal], or the config",
     )
 
 
 def _numbers(mechanism: Mechanism, geometry: Geometry) -> Array:
     """The parameters (P,) in the convention's frames, in units that count as much as a millimetre."""
-    numbers: Array = mechanism.normalize_frames(geometry)[0].vector / mechanism.parameters.like_a_mm
-    return numbers
+    return np.asarray(mechanism.normalize_frames(geometry)[0].vector / mechanism.parameters.like_a_mm)
 
 
 def _other_order(

@@ -24,9 +24,8 @@ from hexacell.identification.terms.compliance import compliance
 from hexacell.identification.terms.play import play
 from hexacell.identification.terms.term import ModelTerm
 from hexacell.identification.thermal_expansion import ThermalExpansion
-from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.legs import Legs
-from hexacell.kinematics.mechanism import Branch, Mechanism, joint_zeros
+from hexacell.kinematics.mechanism import Branch, joint_zeros
 from hexacell.kinematics.parameters import LEGS, MachinePart
 from hexacell.kinematics.pose import FrameTransform, PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -70,10 +69,7 @@ def noise_of(settings: CellSettings) -> Noise:
 
 
 def stated_limits(settings: CellSettings, controller: ControllerGeometry, frames: FrameTransform) -> Limits:
-    """The limits of a cell, and those that the controller's config states as well.
-
-    ``frames`` lead from the controller's to the convention's.
-    """
+    """The limits of a cell and of its controller's config, whose ``frames`` lead to the convention's."""
     limits = settings.limits
     lowest, highest, zeroed = _joint_ranges(settings, controller)
     axes = controller.limits.narrowed(ControllerLimits(axes=limits.axes.ranges)).axes or ()
@@ -126,10 +122,8 @@ def _leg_limits(settings: CellSettings, controller: ControllerGeometry) -> LegLi
     cones = [np.broadcast_to(one, LEGS) for one in (stated.base_cone_deg, stated.platform_cone_deg)]
     if distance == 0.0 and np.min(cones) >= NO_CONE_DEG:
         return None
-    mechanism = settings.mechanism
-    drawing = settings.drawing
-    legs = _legs_in_the_middle(settings, mechanism, drawing, controller.branch)
-    frames = mechanism.normalize_frames(drawing)[1]
+    legs = _legs_in_the_middle(settings, controller.branch)
+    frames = settings.mechanism.normalize_frames(settings.drawing)[1]
     base = _unit(legs.directions_in_carriers[0] if stated.base_axes is None else stated.base_axes)
     platform = legs.directions_in_platform[0] if stated.platform_axes is None else stated.platform_axes
     base_cones, platform_cones = np.radians(cones)
@@ -142,10 +136,9 @@ def _leg_limits(settings: CellSettings, controller: ControllerGeometry) -> LegLi
     )
 
 
-def _legs_in_the_middle(
-    settings: CellSettings, mechanism: Mechanism, drawing: Geometry, branch: Branch
-) -> Legs:
+def _legs_in_the_middle(settings: CellSettings, branch: Branch) -> Legs:
     """The legs of the untilted robot as drawn in the middle of its points and task poses within reach."""
+    mechanism, drawing = settings.mechanism, settings.drawing
     tasks = [pose[:3] for pose in settings.task.poses]
     points = np.array([*settings.identification.points, *settings.verification.points, *tasks])
     every = PoseBatch(points, np.broadcast_to(np.eye(3), (len(points), 3, 3)))
@@ -170,8 +163,7 @@ def _no_axes(problem: str) -> ReachError:
 
 def _unit(vectors: ArrayLike) -> Array:
     given = np.asarray(vectors, dtype=float)
-    unit: Array = given / np.linalg.norm(given, axis=-1, keepdims=True)
-    return unit
+    return np.asarray(given / np.linalg.norm(given, axis=-1, keepdims=True))
 
 
 def stated_expansion(settings: CellSettings) -> ThermalExpansion:
@@ -186,12 +178,8 @@ def stated_effects(
 ) -> tuple[Effect, ...]:
     """All effects that the budget of a cell has lines for, also those of size zero.
 
-    Only a mechanism with rails has those of rails.
-
-    Args:
-        settings: the cell's.
-        measured_range_k: range of the temperatures read while measuring; None without thermometers.
-        known: parts whose expansion is out of the records, so that only what is not known of it acts.
+    ``measured_range_k`` is the range of the temperatures read while measuring. The expansion of the parts
+    that are ``known`` is out of the records, so that only what is not known of it acts.
     """
     stated, words, limits = settings.uncertainty, settings.mechanism.words, settings.limits
 
@@ -207,9 +195,8 @@ def stated_effects(
             effects.append(of("encoder_scale_um_m", encoder_scales))
     elif isinstance(stated, RotaryUncertaintySettings):
         effects.append(of("encoder_eccentricity_mdeg", encoder_eccentricities))
-    joint, unit = words.joint, words.joint_unit
-    is_in_noise = stated.stop_repeatability_acts == "at work"
-    stops = partial(stop_repeatability, is_in_noise=is_in_noise, joint=joint, unit=unit)
+    joint, unit, acts = words.joint, words.joint_unit, stated.stop_repeatability_acts
+    stops = partial(stop_repeatability, is_in_noise=acts == "at work", joint=joint, unit=unit)
     beside = command_repeatability(1e3 * settings.noise.stops, joint=joint, unit=unit)
     effects.append(of(repeatability_key(unit), stops))
     effects.append(replace(beside, source=stated.sources.get(STOPS, "cell file")))

@@ -34,9 +34,7 @@ WEAR_SHARE = 0.1
 
 @dataclass(eq=False)
 class VirtualRobot:
-    """Goes where its controller commands it, on its own geometry, and answers with records.
-
-    Commands are poses in the controller's frames.
+    """Goes where it is commanded in its controller's frames, on its own geometry, and answers with records.
 
     Attributes:
         model: what is known of it: mechanism, commanding geometry, noise and limits.
@@ -73,8 +71,7 @@ class VirtualRobot:
 
     def can_take(self, commands: PoseBatch) -> Mask:
         """Which of n commands in the convention's frames it can take, clear of singularities."""
-        can_take: Mask = self.margins(commands) >= self._least_margin
-        return can_take
+        return np.asarray(self.margins(commands) >= self._least_margin)
 
     def can_stand(self, commands: PoseBatch) -> Mask:
         """Which of n commands it can take with its passive joints and legs within their limits."""
@@ -106,8 +103,8 @@ class VirtualRobot:
         end = self.model.from_commands([command])
         line = interpolate_line(self._commanded, end, PIECES, self.model.frames)
         joints = self._joints(line)
-        arguments = (line.in_shape(-1, 1), joints[:, None], self._actual_pose)
-        traced, found = trace_path(self.model.mechanism, self.truth, *arguments)
+        way = line.in_shape(-1, 1), joints[:, None], self._actual_pose
+        traced, found = trace_path(self.model.mechanism, self.truth, *way)
         if not found[0]:
             raise LimitError("a singularity is on the line")
         poses = traced.in_shape(-1)
@@ -237,14 +234,10 @@ def random_robot(
 
 
 def exact_records(robot: Robot, point: int, poses: PoseBatch) -> Iterator[Record]:
-    """The records of a robot that is exactly as its controller has it, without noise.
+    """The records, without noise, of a robot that is exactly as its controller has it at poses of a point.
 
-    Its joints go straight from pose to pose; from which side they arrive at the first is not known.
-
-    Args:
-        robot: what its controller has.
-        point: counted from 1.
-        poses: poses of the point, in the convention's frames, the reference first.
+    The poses are in the convention's frames, the reference first. The joints go straight from pose to pose;
+    from which side they arrive at the first is not known.
     """
     joints, directions = robot.mechanism.inverse(robot.commanding, robot.branch, poses), UNKNOWN
     least = least_way(robot.mechanism.words.joint_unit, robot.noise.stops)

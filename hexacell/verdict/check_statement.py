@@ -42,8 +42,8 @@ class CheckStatement:
 
     @property
     def is_decided(self) -> bool:
-        """Whether the records are enough for a verdict."""
-        return is_final(self.verdict)
+        """Whether the records are enough for a verdict that a check ends with."""
+        return self.verdict.is_final
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,8 +82,7 @@ class ErrorEstimate:
         if jacobian is None:
             return None
         commanding = belief.mechanism.convention.free_parameters(belief.controller)
-        acting = [effect for effect in effects if effect.size]
-        found = estimate.identification
+        acting, found = [effect for effect in effects if effect.size], estimate.identification
         budget = task.budget(found, belief, acting, earlier) if found is not None and acting else None
         shape = jacobian.shape[:2]
         systematic = np.zeros((*shape, 0)) if budget is None else budget.not_in_covariance
@@ -99,11 +98,6 @@ class ErrorEstimate:
     def after(self, information: Array) -> ErrorEstimate:
         """The errors after records that add information (p, p) and confirm the estimate."""
         return replace(self, covariance=add_information(self.covariance, information))
-
-
-def is_final(verdict: Verdict) -> bool:
-    """Whether a verdict is one that a check ends with."""
-    return verdict in {Verdict.PASS, Verdict.FAIL}
 
 
 def guarded_verdict(likeliest: TaskErrors, guarded: TaskErrors, limits: ErrorLimits) -> Verdict:
@@ -128,7 +122,7 @@ def records_to_decide(
 
     def is_decided(records: int) -> bool:
         likely, careful = (one.after(records * per_record).errors for one in (likeliest, confirmed))
-        return is_final(guarded_verdict(likely, careful, limits))
+        return guarded_verdict(likely, careful, limits).is_final
 
     if not is_decided(MOST_FURTHER_RECORDS):
         return None

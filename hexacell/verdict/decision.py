@@ -44,6 +44,11 @@ class Verdict(StrEnum):
         """Whether the limit is within the uncertainty of the value."""
         return self in {Verdict.CONDITIONAL_PASS, Verdict.CONDITIONAL_FAIL}
 
+    @property
+    def is_final(self) -> bool:
+        """Whether a check ends with it."""
+        return self in {Verdict.PASS, Verdict.FAIL}
+
 
 def decide(error: LargestError, limit: float, guard_band_factor: float = 1.0) -> Verdict:
     """The verdict on an error under a limit, both in the same unit; not a number is not evaluated."""
@@ -109,10 +114,8 @@ def worst_verdict(verdicts: Iterable[Verdict]) -> Verdict:
 
 def decide_both(position: LargestError, orientation: LargestError, limits: ErrorLimits) -> Verdict:
     """The verdict on the largest errors, mm and deg, together."""
-    of_position = decide(position, limits.position_mm, limits.guard_band_factor)
-    return worst_verdict(
-        [of_position, decide(orientation, limits.orientation_deg, limits.guard_band_factor)]
-    )
+    both = (position, limits.position_mm), (orientation, limits.orientation_deg)
+    return worst_verdict(decide(error, limit, limits.guard_band_factor) for error, limit in both)
 
 
 class GeometryErrors(Frozen):

@@ -31,13 +31,7 @@ class EitherSide(Frozen):
 
 
 def places_on_either_side(robot: Robot, belief: RobotBelief, task: Task) -> tuple[EitherSide, ...]:
-    """The other places that the platform may have at poses of a task, the farthest first.
-
-    Args:
-        robot: with the frames of its controller.
-        belief: what is known of its geometry and terms.
-        task: its poses that the robot reaches, in the mechanism's frame convention.
-    """
+    """The other places that the platform may have at poses of a task within reach, the farthest first."""
     if belief.terms is None:
         return ()
     at, found = placement_of(belief, task.poses), list[EitherSide]()

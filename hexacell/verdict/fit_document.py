@@ -17,7 +17,7 @@ from hexacell.verdict.findings import findings
 
 def fit_document(assessed: Assessment) -> dict[str, Any]:
     """What ``hexacell fit --json`` prints and ``result.json`` holds (``docs/interface.md``)."""
-    found = assessed.found
+    found, contradicted = assessed.found, contradicted_points(assessed.points)
     return {
         **IdentificationResult.of(found, assessed.zeros).document(found.geometry.parameters),
         "findings": list(findings(assessed)),
@@ -28,7 +28,15 @@ def fit_document(assessed: Assessment) -> dict[str, Any]:
             "noise_ratio": found.goodness.ratio,
             "agreement": found.goodness.agreement.value,
         },
-        "points_predicted": _points(assessed),
+        "points_predicted": [
+            {
+                "point": one.point,
+                "probability": one.test.probability,
+                "noise_ratio": one.test.ratio,
+                "agrees": one not in contradicted,
+            }
+            for one in assessed.points
+        ],
         "noise": _noise(assessed.noise),
         "measured_noise": assessed.measured_noise and assessed.measured_noise.model_dump(mode="json"),
         "repeatability": _repeatability(assessed),
@@ -53,19 +61,6 @@ def fit_document(assessed: Assessment) -> dict[str, Any]:
         "possible_causes": [asdict(cause) for cause in assessed.possible_causes],
         "beyond_tolerance": [asdict(violation) for violation in assessed.tolerance_violations],
     }
-
-
-def _points(assessed: Assessment) -> list[dict[str, Any]]:
-    contradicted = {one.point for one in contradicted_points(assessed.points)}
-    return [
-        {
-            "point": one.point,
-            "probability": one.test.probability,
-            "noise_ratio": one.test.ratio,
-            "agrees": one.point not in contradicted,
-        }
-        for one in assessed.points
-    ]
 
 
 def _noise(noise: NoiseLevels | None) -> dict[str, Any] | None:
@@ -101,8 +96,7 @@ def _accuracy(assessed: Assessment) -> dict[str, Any] | None:
 
 def _budget(budget: UncertaintyBudget) -> dict[str, Any]:
     figures = ("noise_mm", "systematic_mm", "standard_mm", "expanded_mm", "expanded_deg")
-    lines = [_line(line) for line in budget.lines]
-    return {name: getattr(budget, name) for name in figures} | {"lines": lines}
+    return {name: getattr(budget, name) for name in figures} | {"lines": [*map(_line, budget.lines)]}
 
 
 def _line(line: BudgetLine) -> dict[str, Any]:

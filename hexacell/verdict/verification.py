@@ -57,7 +57,7 @@ class DeviationStatistics:
 
         None without any, or if one is not finite.
         """
-        distances: Array = np.linalg.norm(np.reshape(np.asarray(deviations, dtype=float), (-1, 3)), axis=-1)
+        distances = np.linalg.norm(np.asarray(deviations, dtype=float).reshape(-1, 3), axis=-1)
         if not len(distances) or not np.isfinite(distances).all():
             return None
         return cls(float(distances.mean()), len(distances), references)
@@ -218,16 +218,13 @@ def verified_accuracy(
     is_estimate = robot.identifies is ParameterChoice.ALL and found.terms is None
     written = found.free if is_estimate else robot.free_parameters
     difference = written - updated.free
-    errors = budget.errors_of(difference)
-    of_geometry = budget.errors_of(difference, of_geometry=True) if budget.scatters else None
-    alone = errors_of_geometry_alone(settings, robot, updated)
     return VerifiedAccuracy.of(
-        errors,
+        budget.errors_of(difference),
         settings,
         robot,
         task,
-        of_geometry=of_geometry,
-        alone=alone,
+        of_geometry=budget.errors_of(difference, of_geometry=True) if budget.scatters else None,
+        alone=errors_of_geometry_alone(settings, robot, updated),
         length=length,
         either_side=places_on_either_side(robot, belief, task),
     )

@@ -123,24 +123,17 @@ class Budget:
     @property
     def description(self) -> str:
         """The limits in words."""
-        limits = []
-        if self.records is not None:
-            limits.append(f"{self.records} records")
-        if self.minutes is not None:
-            limits.append(f"{self.minutes:g} minutes")
-        return " or ".join(limits)
+        records = [] if self.records is None else [f"{self.records} records"]
+        minutes = [] if self.minutes is None else [f"{self.minutes:g} minutes"]
+        return " or ".join(records + minutes)
 
 
 def shared_sizes(planned: Mapping[int, int], state: CampaignState, left: Set[int]) -> dict[int, int]:
-    """How many records each point gets at most, so that all points together get as many as planned.
+    """How many records each point gets at most, so that all points together get as many as ``planned``.
 
     No point gets fewer than planned, though another one had more while this one seemed out of reach,
-    and none more than ``MOST_SHARE`` times as many.
-
-    Args:
-        planned: how many at each point.
-        state: with the points that are done, whether they got their records or not.
-        left: further points that cannot be measured as far as is known.
+    and none more than ``MOST_SHARE`` times as many. Beside the points that are done, whether they got their
+    records or not, those ``left`` cannot be measured as far as is known.
     """
     waiting = set(planned) - state.done - left
     if not waiting:

@@ -47,17 +47,13 @@ class CampaignState:
     @property
     def begun_points(self) -> int:
         """How many points have been begun, the present one included."""
-        begun = set(self.measurements.counts)
-        return len(begun if self.point is None else begun | {self.point})
+        return len({*self.measurements.counts, self.point} - {None})
 
 
 class Forecast(Frozen):
     """The predicted error at the worst task pose, 1 sigma, mm: now, after this record, at the end.
 
     Attributes:
-        now_mm: error by the records so far.
-        next_mm: error with the proposed record.
-        end_mm: error once everything that is still planned is measured.
         records: number of records still planned, the proposed one included, and the ``minutes`` of them.
         systematic_mm: standard uncertainty by the systematic effects there, at the end; None where it is
             not known.
@@ -82,10 +78,7 @@ class Forecast(Frozen):
 
 @dataclass(frozen=True, slots=True)
 class StartPoint:
-    """Begin a point: go there, and zero the gauges.
-
-    ``pose`` is in the controller's frames, ``joints`` are those that the controller will go to.
-    """
+    """Begin a point: go to its pose, in the controller's frames, by these joints; zero the gauges."""
 
     point: int
     pose: Pose

@@ -28,7 +28,6 @@ LARGEST_SHARE_UNKNOWN = 0.5
 """Share of the error at the worst task pose that records may leave of what the drawing does; with more the
 robot would hardly be better."""
 
-
 TIMES_THE_LIMIT = 10.0
 """Times the limit that the error may be predicted to be, with two sigma: a plan that leaves more measures
 too little, whatever the noise."""
@@ -78,9 +77,7 @@ def too_few_records(plan: Plan) -> Iterator[HexacellError]:
         return
     points, size = len(plan.points), plan.settings.identification.orientations
     needed = 1 - (-unknowns // (3 * points))
-    what = (
-        f"{points} points with {size} orientations" if plan.pose_list is None else str(plan.pose_list.path)
-    )
+    what = f"{points} points with {size} orientations" if plan.pose_list is None else plan.pose_list.path
     yield UsageError(
         f"{what} give {equations} equations for {unknowns} parameters",
         subject="[identification]",
@@ -104,11 +101,11 @@ def optimisation_failures(plan: Plan) -> Iterator[list[HexacellError]]:
 
     Yields the failures after each part of the work, often an empty list: the caller may stop in between.
     """
-    any_failure = False
+    failures: list[HexacellError] = []
     for found in measuring_failures(plan):
-        any_failure = any_failure or bool(found)
+        failures += found
         yield found
-    if not any_failure:
+    if not failures:
         yield [*_no_better(plan)]
 
 
@@ -125,13 +122,11 @@ def unreachable_share(plan: Plan) -> dict[int, float]:
 
     Robots that would have a passive joint or a leg beyond its limits there do not reach it either.
     """
-    references = plan.robot.from_commands([plan.reference_pose(point) for point in plan.points])
-    robots = robots_within_tolerances(
-        plan.robot, plan.effort.checked_robots, plan.settings.identification.seed
-    )
-    can_stand = np.array([VirtualRobot(plan.robot, truth).can_stand(references) for truth in robots])
-    unreachable = 1.0 - can_stand.mean(axis=0)
-    return dict(zip(plan.points, unreachable.tolist(), strict=True))
+    robot, count, seed = plan.robot, plan.effort.checked_robots, plan.settings.identification.seed
+    references = robot.from_commands([plan.reference_pose(point) for point in plan.points])
+    robots = [VirtualRobot(robot, truth) for truth in robots_within_tolerances(robot, count, seed)]
+    can_stand = np.array([one.can_stand(references) for one in robots])
+    return dict(zip(plan.points, (1.0 - can_stand.mean(axis=0)).tolist(), strict=True))
 
 
 def _unreachable_points(plan: Plan) -> Iterator[HexacellError]:
@@ -273,9 +268,8 @@ def _of_legs(robot: Robot, poses: PoseBatch, joints: Array) -> Iterator[str]:
         return
     legs = robot.mechanism.legs(robot.commanding, poses, joints)
     spare = limits.spare_angles(legs)[0]
-    for where, cones, left in zip(
-        ("base", "platform"), (limits.base_cones, limits.platform_cones), spare, strict=True
-    ):
+    stated = limits.base_cones, limits.platform_cones
+    for where, cones, left in zip(("base", "platform"), stated, spare, strict=True):
         if left.min() < 0.0:
             leg = int(np.argmin(left))
             turned, cone = np.degrees([cones[leg] - left[leg], cones[leg]])

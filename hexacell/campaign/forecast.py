@@ -66,13 +66,10 @@ class Forecaster:
             return None
         now = after = error.worst(belief.covariance)
         if selected is not None:
-            record = selected.record
-            after = error.worst(
-                covariance_update(belief.joint_covariance, record.jacobian[0], record.covariance[0])
-            )
+            record = selected.record.jacobian[0], selected.record.covariance[0]
+            after = error.worst(covariance_update(belief.joint_covariance, *record))
         planned = self.planned(state)
-        end = error.worst(self._covariance_after(belief, state, planned))
-        records = sum(planned.values())
+        end, records = error.worst(self._covariance_after(belief, state, planned)), sum(planned.values())
         begun_later = len(set(planned) - {state.point})
         return Forecast(
             now_mm=now,
@@ -100,12 +97,10 @@ class Forecaster:
         # The present point comes first.
         left = sorted(set(self.sizes(state)) - state.done, key=lambda point: (point != state.point, point))
         for point in left:
-            is_begun = state.point == point
-            more = self._most(state, point, records, points)
-            if more < (1 if is_begun else 2):
-                continue
-            planned[point] = more
-            records, points = records + more, points + (not is_begun)
+            is_begun, more = state.point == point, self._most(state, point, records, points)
+            if more >= (1 if is_begun else 2):
+                planned[point] = more
+                records, points = records + more, points + (not is_begun)
         return planned
 
     def rank_points(
@@ -120,8 +115,7 @@ class Forecaster:
             return dict.fromkeys(points, math.inf), points[0]
         error = TaskError(error.jacobian)  # that of all parameters, which records improve whatever is held
         information = PlannedInformation.of(self.sets_at(points), belief)
-        gains: dict[int, float] = {}
-        rates: dict[int, float] = {}
+        gains, rates = dict[int, float](), dict[int, float]()
         for point in points:
             options = self._options(state, belief.joint_covariance, information, error, point)
             gains[point] = max((gain for gain, _ in options), default=0.0)
@@ -219,8 +213,7 @@ class PlannedInformation:
         weighted = weights @ jacobian
         total = weighted.sum(axis=0)
         mean = np.linalg.solve(weights.sum(axis=0), total)
-        information: Array = jacobian.reshape(-1, size).T @ weighted.reshape(-1, size) - total.T @ mean
-        return information
+        return np.asarray(jacobian.reshape(-1, size).T @ weighted.reshape(-1, size) - total.T @ mean)
 
     def added(self, state: CampaignState, point: int, records: int) -> Array:
         """The information that more records at a point add; those it has count for its zero only."""
@@ -244,10 +237,9 @@ def select_sets(
 
     In the mechanism's frame convention; empty where the robot cannot go.
     """
-    rotated = candidates.orientations(
-        candidate_count, drawn.limits.tilt, seed, most_twist=drawn.limits.turn
-    )
-    orientations = drawn.limits.orientations(np.concatenate([np.eye(3)[None], rotated]))
+    limits = drawn.limits
+    rotated = candidates.orientations(candidate_count, limits.tilt, seed, most_twist=limits.turn)
+    orientations = limits.orientations(np.concatenate([np.eye(3)[None], rotated]))
     return tuple(_select(drawn, PoseBatch.at(point, orientations), records) for point in points)
 
 

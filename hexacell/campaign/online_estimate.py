@@ -210,11 +210,9 @@ def _search(problem: Problem, found: Identification) -> ChainedEstimate:
     best = _from_other_starts(problem, found)
     if _is_plausible(problem, best):
         return ChainedEstimate(best)
-    if clean := _without_false_records(best):
-        return clean
     # The best one may be of fewer records, and the cost of all of them is what there was to explain.
     unexplained = max(cost(found), cost(best))
-    return ChainedEstimate(best, in_vain=(unexplained, problem.records))
+    return _without_false_records(best) or ChainedEstimate(best, in_vain=(unexplained, problem.records))
 
 
 def _without_false_records(found: Identification) -> ChainedEstimate | None:
@@ -243,8 +241,7 @@ def _from_other_starts(problem: Problem, found: Identification) -> Identificatio
             same += 1
         elif is_better:
             same = 0
-        if is_better:
-            best = other
+        best = other if is_better else best
     return best if best.converged else _continued(problem, best)
 
 
@@ -254,8 +251,7 @@ def _estimates_from_other_starts(problem: Problem) -> Iterator[Identification]:
     With few records, one of them may be beyond a singularity for all robots near the drawing.
     """
     yield estimate_online(problem)
-    for restarted in restarts(problem):
-        yield estimate_online(restarted, TRIAL)
+    yield from (estimate_online(restarted, TRIAL) for restarted in restarts(problem))
 
 
 def _continued(problem: Problem, before: Identification) -> Identification:

@@ -144,15 +144,11 @@ class Plan:
         found, belief = estimate.identification, estimate.belief
         if found is None:
             return False
-        at_last = found.poses[[-1]], found.problem.joints[[-1]]
-        if belief.orientation_sigma(*at_last) > PROVISIONAL_SIGMA:
+        if belief.orientation_sigma(found.poses[[-1]], found.problem.joints[[-1]]) > PROVISIONAL_SIGMA:
             return False
-        error = self.task.error(belief)
-        if error is None:
-            return True
         # Whether the geometry that commands errs by more at the task poses than the estimate may.
-        change = belief.free - self.robot.free_parameters
-        return error.largest(change) > error.worst(belief.covariance)
+        error, change = self.task.error(belief), belief.free - self.robot.free_parameters
+        return error is None or error.largest(change) > error.worst(belief.covariance)
 
     def forecast(self, state: CampaignState) -> Forecast | None:
         """The gain of further records; None without task poses."""
@@ -170,9 +166,8 @@ class Plan:
 
     def records_at(self, point: int) -> int:
         """How many records a point gets at most, its reference included."""
-        if self.pose_list is not None:
-            return len(self.pose_list.at(point))
-        return self.settings.identification.orientations
+        listed = self.pose_list
+        return self.settings.identification.orientations if listed is None else len(listed.at(point))
 
     def sizes(self, state: CampaignState) -> Mapping[int, int]:
         """How many records each point gets at most, once some points were found to be out of reach.
@@ -247,8 +242,7 @@ class Plan:
             return mean
         free = len(belief.free)
         of_terms = mean[free:, free:] + np.linalg.inv(belief.terms.covariance)
-        taken: Array = mean[:free, free:] @ np.linalg.solve(of_terms, mean[free:, :free])
-        return mean[:free, :free] - taken
+        return mean[:free, :free] - mean[:free, free:] @ np.linalg.solve(of_terms, mean[free:, :free])
 
     @cached_property
     def forecaster(self) -> Forecaster:
@@ -373,8 +367,6 @@ class Plan:
         return [point for point, route in routes.items() if route is not None]
 
     def _start(self, point: int) -> StartPoint:
-        pose = self.reference_pose(point)
-        joints = self.robot.mechanism.inverse(
-            self.robot.controller, self.robot.branch, PoseBatch.of([pose])
-        )
+        robot, pose = self.robot, self.reference_pose(point)
+        joints = robot.mechanism.inverse(robot.controller, robot.branch, PoseBatch.of([pose]))
         return StartPoint(point, pose, joints_of(joints[0]))

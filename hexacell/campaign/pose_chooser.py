@@ -82,8 +82,7 @@ class PoseChooser:
     ) -> tuple[Pose, ...] | None:
         """The poses between the present one and the selected one, whose path starts from a row of records.
 
-        None where no straight line leads onto that path, as from the reference to which an interrupted run
-        returned by another way than it came.
+        None where no straight line leads onto that path, after an interrupted run returned by another way.
         """
         if state.present is None:
             return ()
@@ -141,8 +140,7 @@ class PoseChooser:
         attempt = state.records_at(point) + 100 * state.rejections + 10_000 * len(state.pilots)
         seed = self.settings.identification.seed + 1000 * point + attempt
         turns = candidates.orientations(count, tilt, seed, amplitudes, turn)
-        allowed: Array = turns[np.linalg.norm(rotations.to_vector(turns), axis=1) <= most]
-        return allowed
+        return np.asarray(turns[np.linalg.norm(rotations.to_vector(turns), axis=1) <= most])
 
     def _criterion(self, belief: RobotBelief) -> Criterion:
         name = self.settings.identification.criterion

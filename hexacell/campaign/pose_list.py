@@ -46,12 +46,9 @@ def pose_list_of(cell: Cell) -> PoseList | None:
     at_points: list[list[Pose]] = [[] for _ in range(points)]
     for line, point, pose in read_poses(path):
         if point > points:
-            raise FileError(
-                f"there is no point {point}, the cell file has {points}",
-                subject=path,
-                line=line,
-                action="Correct the number, or add the point under [identification]",
-            )
+            problem = f"there is no point {point}, the cell file has {points}"
+            action = "Correct the number, or add the point under [identification]"
+            raise FileError(problem, subject=path, line=line, action=action)
         at_points[point - 1].append(pose)
     for number, poses in enumerate(at_points, start=1):
         if len(poses) < 2:

@@ -20,11 +20,9 @@ class Goal(Protocol):
 
     def reached(self, measurements: MeasurementSet) -> str | None:
         """The reason why the records are enough; None if they are not."""
-        ...
 
     def reached_at(self, point: int, measurements: MeasurementSet) -> str | None:
         """The reason why a point needs no more records, although others may; None if it does."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,10 +83,8 @@ class StoppingRules:
         if target is None or not len(state.measurements):
             return None
         estimate = self.estimator(state.steering)
-        if estimate.identification is None:
-            return None
-        problem = estimate.identification.problem
-        if not problem.subset(are_counted(problem)).is_determined:
+        found = estimate.identification
+        if found is None or not found.problem.subset(are_counted(found.problem)).is_determined:
             return None
         worst = self.forecaster.worst_error(state, estimate.belief)
         if worst is None or worst > target:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -51,8 +52,8 @@ class TaskError:
 
     def weight(self) -> Array:
         """Weight W (p, p) of the parameters' covariance C: ``tr(W C)`` is the mean square error."""
-        weight: Array = np.einsum("nap,naq->pq", self.jacobian, self.jacobian, optimize=True)
-        return weight / len(self.jacobian)
+        squares = np.einsum("nap,naq->pq", self.jacobian, self.jacobian, optimize=True)
+        return np.asarray(squares / len(self.jacobian))
 
     def worst(self, covariance: Array) -> float:
         """One standard deviation at the worst pose, mm."""
@@ -101,11 +102,7 @@ class Task:
         scale: ScaleObservation | None = None,
         zeros: IdentifiedZeros | None = None,
     ) -> UncertaintyBudget | None:
-        """The uncertainty of the errors; None if the estimated robot can take no task pose.
-
-        ``earlier`` and ``zeros`` are those of :meth:`.Propagation.of`, ``scale`` of
-        :meth:`.UncertaintyBudget.of`.
-        """
+        """The uncertainty of the errors (:class:`.UncertaintyBudget`); None if no task pose is in reach."""
         reached = self.reachable(belief)
         if not len(reached.poses) or not len(reached.workspace):
             return None
@@ -139,8 +136,7 @@ class Task:
 
         Without what another choice of frames would explain; None if no task pose can be taken.
         """
-        both = PoseBatch.joined([self.poses, self.workspace])
-        taken = _are_taken(belief, both)
+        taken = _are_taken(belief, PoseBatch.joined([self.poses, self.workspace]))
         task, workspace = (np.flatnonzero(some) for some in np.split(taken, [len(self.poses)]))
         if not len(task) or not len(workspace):
             return None
@@ -162,21 +158,13 @@ def planned_systematic_mm(
 ) -> float | None:
     """The standard uncertainty by the systematic effects at the worst task pose, mm.
 
-    It is that of the result of all planned poses, for a robot as its controller has it. Before all of them
-    are measured the noise is larger by far. None where no such robot can be identified.
-
-    Args:
-        robot: with its effects.
-        task: where it counts.
-        sets: planned poses at each point, the reference first, in the convention's frames.
-        earlier: what the effects did to an earlier result that is the prior, by their names.
+    It is that of the result of all poses of the planned ``sets``, for a robot as its controller has it.
+    Before all of them are measured the noise is larger by far. None where no such robot can be identified.
     """
     effects = [effect for effect in robot.effects if effect.size]
     if not effects:
         return 0.0
-    records = [
-        one for point, poses in enumerate(sets, start=1) for one in exact_records(robot, point, poses)
-    ]
+    records = [*chain.from_iterable(exact_records(robot, *one) for one in enumerate(sets, start=1))]
     try:
         found = estimate_online(robot.problem(MeasurementSet(tuple(records))))
         budget = task.budget(found, robot.belief(found), effects, earlier)

@@ -61,8 +61,6 @@ KEPT_APART = float(np.radians(3.0))
 APART = float(np.radians(6.0))
 """Candidates that are turned are at least so far from one another, rad, or as far as they were turned."""
 
-GainOfRecords = Callable[[PredictedRecords], Array]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RatedRecords(Batch):
@@ -82,13 +80,12 @@ class CandidateSpace:
 
     belief: RobotBelief
     zero: GaugeZero
-    gain: GainOfRecords
+    gain: Callable[[PredictedRecords], Array]
 
     def rated(self, orientations: Array) -> RatedRecords | None:
         """The possible records of some orientations (n, 3, 3); None if the robot can take none of them."""
         belief, zero = self.belief, self.zero
-        poses = PoseBatch.at(zero.reference, orientations)
-        targets = targets_within_limits(belief, poses)
+        targets = targets_within_limits(belief, PoseBatch.at(zero.reference, orientations))
         records, clear = predict_clear_records(belief, zero, targets, self._mode)
         if not clear.any():
             return None

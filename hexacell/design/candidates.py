@@ -119,10 +119,8 @@ def commands_for(belief: RobotBelief, targets: ReachableTargets) -> tuple[PoseBa
     singularity, on another assembly mode or beyond the limits of a command.
     """
     commands = belief.commanded.commands_for(targets.poses, targets.joints)
-    margin = belief.limits.singularity_margin
-    clear = has_singularity_margin(
-        belief.mechanism, belief.controller, commands.poses, targets.joints, margin
-    )
+    at = belief.mechanism, belief.controller, commands.poses, targets.joints
+    clear = has_singularity_margin(*at, belief.limits.singularity_margin)
     return commands.poses, commands.found & clear & belief.limits.allow_commands(commands.poses)
 
 
@@ -151,10 +149,8 @@ def workspace_poses(belief: RobotBelief, points: Array) -> PoseBatch:
     Poses that the robot cannot take within its limits, by its estimated geometry or by the controller's,
     are left out.
     """
-    vectors = min(WORKSPACE_ANGLE, belief.limits.tilt) * np.concatenate(
-        [np.zeros((1, 3)), np.eye(3), -np.eye(3)]
-    )
-    rotated = rotations.from_vector(vectors)
+    axes = np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+    rotated = rotations.from_vector(min(WORKSPACE_ANGLE, belief.limits.tilt) * axes)
     positions = np.repeat(points, len(rotated), axis=0)
     poses = PoseBatch(positions, np.tile(rotated, (len(points), 1, 1)))
     return reachable(belief, poses)[0].poses

@@ -30,10 +30,8 @@ class Criterion:
     def gain(self, covariance: Array, jacobian: Array, noise: Array) -> Array:
         """What each of n records would gain (n,): nat for D, mm^2 for A and I.
 
-        Args:
-            covariance: of the free parameters (p, p), mm^2.
-            jacobian: of the records (n, 3, p).
-            noise: covariance of the records themselves (n, 3, 3), mm^2.
+        By the ``covariance`` (p, p) of the parameters, mm^2, the ``jacobian`` of the records (n, 3, p), and
+        the covariance of their ``noise`` (n, 3, 3), mm^2.
         """
         total = innovation_covariance(covariance, jacobian, noise)
         if self.weight is None:
@@ -41,8 +39,7 @@ class Criterion:
         weighted = covariance[: len(self.weight)]
         # tr(W C H^T S^-1 H C) is the sum of the products of S^-1 with H C W C H^T, both 3 x 3.
         removed = _quadratic_forms(weighted.T @ self.weight @ weighted, jacobian)
-        gain: Array = np.einsum("nij,nji->n", np.linalg.inv(total), removed)
-        return gain
+        return np.asarray(np.einsum("nij,nji->n", np.linalg.inv(total), removed))
 
 
 D_OPTIMAL = Criterion()

@@ -70,16 +70,8 @@ def select_pose(
     """The best by a criterion of some orientations (n, 3, 3), relative to the platform's at the reference.
 
     They are not relative to the level platform: with millimetres of error in the joints the platform may
-    be 20 degrees from where the controller believes it to be.
-
-    Args:
-        planner: of paths from where the robot is.
-        zero: of the point's gauges.
-        orientations: candidates.
-        criterion: what is best.
-        known_then: covariance of parameters and terms (p + 6 m, p + 6 m) beside which a record has to
-            gain; None for the current one.
-        rounds: of refinement.
+    be 20 degrees from where the controller believes it to be. A record has to gain beside what is
+    ``known_then`` of parameters and terms, a covariance (p + 6 m, p + 6 m); None for the current one.
 
     Raises:
         LimitError: none is reachable within the limits and almost surely inside the travel.
@@ -143,8 +135,8 @@ class _PathSearch:
         for some in _batches(rows, UNCERTAIN_BATCH if self.travel.is_uncertain else PATH_BATCH):
             holds = self.travel.holds(records[some])
             for few in _batches(some, PATH_BATCH):
-                arguments = records[few], commands[few], gains[few]
-                if selected := self.first_of_few(*arguments, holds[few - some[0]]):
+                hold = holds[few - some[0]]
+                if selected := self.first_of_few(records[few], commands[few], gains[few], hold):
                     return selected
         return None
 
@@ -159,8 +151,7 @@ class _PathSearch:
         if not len(rows):
             return None
         paths = self.planner.options(commands)
-        straight = self._first(paths.straight, rows)
-        worth_waypoints = rows
+        worth_waypoints, straight = rows, self._first(paths.straight, rows)
         if straight is not None:
             better = rows[rows < straight[0]]
             worth_waypoints = better[gains[better] >= WAYPOINT_GAIN_RATIO * gains[straight[0]]]

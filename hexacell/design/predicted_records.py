@@ -66,8 +66,7 @@ class GaugeZero:
 
     def mode(self, belief: RobotBelief) -> Array:
         """The assembly mode (1,) of the estimated robot at the reference."""
-        target = self.target
-        return modes_of(belief.mechanism, belief.estimate, target.poses, target.joints)
+        return modes_of(belief.mechanism, belief.estimate, self.target.poses, self.target.joints)
 
 
 def estimate_gauge_zero(
@@ -75,12 +74,8 @@ def estimate_gauge_zero(
 ) -> GaugeZero:
     """The weighted mean of the zeros by each of a point's records (n).
 
-    Args:
-        belief: what is known of the robot.
-        poses: of the records, under the estimate; the first is the reference.
-        joints: joint variables (n, 6), mm.
-        deviations: what the gauges showed (n, 3), mm.
-        directions: from which the joints arrived (n, 6); None: not known.
+    The first of their ``poses``, under the estimate, is the reference. ``directions`` (n, 6) are those from
+    which the joints arrived; None: not known.
 
     Raises:
         LimitError: all poses are at a singularity, where the records have no information.

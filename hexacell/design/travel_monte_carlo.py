@@ -71,7 +71,6 @@ FEWEST_SAMPLES = 6
 MARGIN_SHARE = 0.5
 """Share of the singularity margin that all sampled robots must keep."""
 
-
 TOLERANCE_MM = 1e-4
 """Largest constraint of sampled robots, whose deviations are compared with millimetres of travel."""
 
@@ -239,7 +238,6 @@ class _Scenario:
         at_reference = geometries.subset(first), solved.poses[first], self.joints[rows[first]]
         kept = found[first] & has_singularity_margin(mechanism, *at_reference, margin)
         kept &= (leg_margins[first] >= 0.0).all(axis=-1)
-
         shape = len(errors), len(at)
         beside = belief.beside(self.poses[at], self.joints[at])
         positions = solved.poses.positions.reshape(*shape, 3)[kept] + beside
@@ -253,14 +251,12 @@ class _Scenario:
 def _nearly_all_within(sampled: _SampledRobots, limits: Limits, spread: Array, share: float) -> Mask:
     """At which targets all sampled robots but the worst stay within a share of the gauges' room.
 
-    The ``spread`` (n, 3), mm, is of their stops.
-    Of all that take the target the legs are free.
+    The ``spread`` (n, 3), mm, is of their stops. Of all that take the target the legs are free.
     """
     stay = sampled.found & limits.within_travel(sampled.deviations, share=share)
     stay &= limits.within_travel(sampled.deviations, spread, TRAVEL_SHARE)
     are_free = (sampled.leg_margins >= 0.0).all(axis=-1)
-    within: Mask = (np.count_nonzero(~stay, axis=0) <= 1) & (are_free | ~sampled.found).all(axis=0)
-    return within
+    return np.asarray((np.count_nonzero(~stay, axis=0) <= 1) & (are_free | ~sampled.found).all(axis=0))
 
 
 def _all_within(sampled: _SampledRobots, limits: Limits, stops: Array, share: float) -> Mask:
@@ -278,8 +274,7 @@ def _all_within(sampled: _SampledRobots, limits: Limits, stops: Array, share: fl
     stay &= limits.within_travel(deviations, stops, stopped)
     mean = margins.mean(axis=0)
     are_free = (mean >= SPARE_SIGMAS * np.sqrt(np.mean((margins - mean) ** 2, axis=0))).all(axis=-1)
-    within: Mask = np.all(stay, axis=0) & predicted & are_free
-    return within
+    return np.asarray(np.all(stay, axis=0) & predicted & are_free)
 
 
 @lru_cache

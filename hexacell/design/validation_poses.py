@@ -51,9 +51,8 @@ def select_validation_poses(
         raise LimitError(f"the actual pose at the command {poses.pose(0)} is not within the limits")
     selected = _select_farthest(belief, poses[inside], actual.poses[inside], used, count)
     if len(selected) < count:
-        raise LimitError(
-            f"only {len(selected)} orientations at {poses.pose(0)} keep the ball inside the travel"
-        )
+        kept = f"only {len(selected)} orientations at {poses.pose(0)}"
+        raise LimitError(f"{kept} keep the ball inside the travel")
     return poses[inside][selected]
 
 
@@ -67,8 +66,7 @@ def _stays_inside(belief: RobotBelief, actual: ActualPoses) -> Mask:
     sigma = belief.limits.sigma_along_gauges(as_known)
     each = belief.noise.chance_covariance(by_joints)
     chance = belief.limits.sigma_along_gauges(each + each[0])
-    deviation = actual.poses.positions - actual.poses.positions[0]
-    spread = SAFETY_SIGMAS * sigma
+    deviation, spread = actual.poses.positions - actual.poses.positions[0], SAFETY_SIGMAS * sigma
     stopped = np.hypot(spread, CHANCE_SIGMAS * chance)
     # They are chosen long before the gauges are placed there.
     inside = belief.limits.within_travel(deviation, spread, TRAVEL_SHARE, surely=True)
@@ -108,5 +106,4 @@ def _select_farthest(
 
 def _angles(orientations: Array, other: Array) -> Array:
     """Angles (n,), rad, between orientations (n, 3, 3) and another one (3, 3)."""
-    angles: Array = np.linalg.norm(rotations.to_vector(orientations @ other.T), axis=-1)
-    return angles
+    return np.asarray(np.linalg.norm(rotations.to_vector(orientations @ other.T), axis=-1))

@@ -122,7 +122,8 @@ class _Search:
 
     def _gain(self, name: str, taken: Model) -> tuple[float, ModelTerm]:
         """Logarithm of the Bayes factor of a term beside others, and the term with its likeliest size."""
-        sizes = [self.offered[name].times(share) for share in SHARES]
+        term = self.offered[name]
+        sizes = [replace(term, size=share * term.size) for share in SHARES]
         gains = np.array([self._evidence((*taken, one)) for one in sizes]) - self._evidence(taken)
         best = int(gains.argmax())
         mean = gains[best] + np.log(np.mean(np.exp(gains - gains[best])))

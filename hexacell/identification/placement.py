@@ -57,9 +57,8 @@ class Placement:
         of_legs = np.empty_like(changes)
         of_legs[parameters.leg_order] = changes
         by_leg = of_legs.reshape(6, parameters.numbers_per_leg, -1)
-        return np.asarray(
-            self.by_constraints @ np.einsum("nic,ick->nik", self.derivatives.parameters, by_leg)
-        )
+        errors = np.einsum("nic,ick->nik", self.derivatives.parameters, by_leg)
+        return np.asarray(self.by_constraints @ errors)
 
 
 @dataclass(frozen=True, eq=False)

@@ -73,10 +73,8 @@ class ThermalExpansion:
         """The joint variables (n, 6) that parts not ``warmer`` (n, 7), K, would have at the same poses."""
         if not warmer.any():
             return at.joints
-        legs, base = warmer[:, :LEGS], warmer[:, LEGS:]
-        return np.asarray(
-            at.joints + at.as_joints(longer_legs(at, self.legs_um_m_k * legs - self.base_um_m_k * base))
-        )
+        longer = self.legs_um_m_k * warmer[:, :LEGS] - self.base_um_m_k * warmer[:, LEGS:]
+        return np.asarray(at.joints + at.as_joints(longer_legs(at, longer)))
 
 
 def longer_legs(at: Placement, um_per_m: float | Array) -> Array:

@@ -104,10 +104,10 @@ class Allowances:
         second one is so many ``readings`` later, between which the gauges drift as is known of them.
         """
         ball, change = self.ball_at(reference, before[3:]), now - before
-        joints = change[3:]
-        covariance = 2.0 * self._record_covariance(ball) + ball.covariance(joints)
+        joints, noise = change[3:], self.robot.noise
+        covariance = 2.0 * noise.record_covariance(ball.by_joints[None])[0] + ball.covariance(joints)
         is_fixed = self.settings.guards.limits == "fixed"
-        explicable = SIGMAS * np.sqrt(np.diag(covariance) + readings * self.robot.noise.walk_mm**2)
+        explicable = SIGMAS * np.sqrt(np.diag(covariance) + readings * noise.walk_mm**2)
         if unknown is not None:
             explicable = explicable + np.abs(ball.by_joints) @ unknown
         return ReferenceChange(
@@ -146,9 +146,8 @@ class Allowances:
         Raises:
             LimitError: the machine scatters so much that no pose keeps it there.
         """
-        ball = self.ball_at(reference)
-        at_zero = self._record_covariance(ball)
-        chance = at_zero + self.robot.noise.chance_covariance(ball.by_joints[None])[0]
+        by_joints, noise = self.ball_at(reference).by_joints[None], self.robot.noise
+        chance = noise.record_covariance(by_joints)[0] + noise.chance_covariance(by_joints)[0]
         needed = 2.0 * CHANCE_SIGMAS * float(np.sqrt(np.diag(chance).max())) / CHANCE_SHARE
         gauges, limits = self.settings.gauges, self.settings.limits
         travel = min(2.0 * limits.gauge_travel_mm, *(gauge.travel_mm for gauge in gauges))
@@ -159,10 +158,6 @@ class Allowances:
                 action=f"Use gauges with a travel of more than {needed:.0f} mm, and state it in "
                 "gauges.travel_mm and limits.gauge_travel_mm; or look for play in guides and joints",
             )
-
-    def _record_covariance(self, ball: BallByEncoders) -> Array:
-        """Covariance (3, 3), mm^2, of what the gauges show in a record, less what its encoders explain."""
-        return np.asarray(self.robot.noise.record_covariance(ball.by_joints[None])[0])
 
     def ball_at(self, reference: Pose, shown: Array | None = None) -> BallByEncoders:
         """How the ball moves near a reference by the encoders, which have ``shown`` (6,) there."""

@@ -118,10 +118,8 @@ class Repeats:
             return replace(noise, freedom=self.freedom) if self.is_measured else noise
         stops = self.unseen_stops(noise)
         if stops.better > 0.0:
-            noise = noise.with_devices(
-                np.hypot(noise.encoders, stops.size).tolist(), noise.gauges_mm.tolist()
-            )
-            return replace(noise, freedom=stops.freedom)
+            encoders = np.hypot(noise.encoders, stops.size).tolist()
+            return replace(noise.with_devices(encoders, noise.gauges_mm.tolist()), freedom=stops.freedom)
         return replace(noise.scaled(self._factor), freedom=self.freedom)
 
     def unseen_stops(self, noise: Noise) -> MoreScatter:
@@ -171,9 +169,8 @@ class Repeats:
         misfit = np.einsum("ni,snij,nj->s", self._shown, inverses, self._shown)
         costs = misfit + np.linalg.slogdet(covariances)[1].sum(axis=-1)
         best = int(np.argmin(costs))
-        of_all = np.linalg.slogdet(self._covariances)[1].sum() + self.freedom * (
-            2.0 * np.log(self._factor) + 1.0
-        )
+        by_factor = self.freedom * (2.0 * np.log(self._factor) + 1.0)
+        of_all = np.linalg.slogdet(self._covariances)[1].sum() + by_factor
         better = 0.5 * float(of_all - costs[best])
         weighted = sizes[best] ** 2 * (inverses[best] @ squares)
         freedom = float(np.einsum("nij,nji->", weighted, weighted))

@@ -132,9 +132,8 @@ class UncertaintyBudget:
         lines = [line for line in self.lines if not (of_geometry and line.effect.occurrence is STOPS)]
         stated = [line.columns for line in lines if np.isinf(line.effect.freedom)]
         columns = [self.noise, _joined(stated, self.noise.shape[:2])]
-        measured = tuple(
-            (line.columns, line.effect.freedom) for line in lines if np.isfinite(line.effect.freedom)
-        )
+        freedoms = ((line.columns, line.effect.freedom) for line in lines)
+        measured = tuple(one for one in freedoms if np.isfinite(one[1]))
         return TaskErrors(estimated, np.concatenate(columns, axis=-1), measured)
 
     @property
@@ -145,11 +144,8 @@ class UncertaintyBudget:
     @property
     def parameter_columns(self) -> Mapping[str, Array]:
         """What one unit of each effect did to the estimate (p, k), by the names of the effects."""
-        return {
-            line.effect.name: line.parameter_columns
-            for line in self.lines
-            if line.effect.occurrence.is_in_records
-        }
+        in_records = (line for line in self.lines if line.effect.occurrence.is_in_records)
+        return {line.effect.name: line.parameter_columns for line in in_records}
 
     @cached_property
     def systematic(self) -> Array:
@@ -190,9 +186,8 @@ class UncertaintyBudget:
     @property
     def unseen(self) -> tuple[BudgetLine, ...]:
         """Effects of the machine itself, not of its place of work, that no record can show."""
-        return tuple(
-            line for line in self.lines if not line.is_visible and line.effect.occurrence in OF_THE_MACHINE
-        )
+        hidden = (line for line in self.lines if not line.is_visible)
+        return tuple(line for line in hidden if line.effect.occurrence in OF_THE_MACHINE)
 
     @cached_property
     def _unknown(self) -> TaskErrors:

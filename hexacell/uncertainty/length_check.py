@@ -35,7 +35,7 @@ from hexacell.uncertainty.length_records import (
     errors_by_gauges,
     shared_errors,
 )
-from hexacell.uncertainty.propagation import ScaleObservation
+from hexacell.uncertainty.propagation import ScaleObservation, each_alone
 from hexacell.uncertainty.statement import COVERAGE_FACTOR, covariance_factor
 
 HARDLY_MM2 = 0.01
@@ -162,13 +162,12 @@ class LengthCheck:
         """The error that the encoders have in common by this check, for an uncertainty budget."""
         alone = [self._of(error) for error in self.errors if not error.is_shared]
         alone += [*self._of_standard.values(), self._of_noise]
+        shared = self.by_effects.items()
         return ScaleObservation(
             farther_um_m=-self.encoders_long_um_m,
             sigma_um_m=float(np.linalg.norm(alone)),
             by_parameters=-self._share(self._to_length(self.jacobian)),
-            by_effects={
-                name: -self._share(self._to_length(columns)) for name, columns in self.by_effects.items()
-            },
+            by_effects={name: -self._share(self._to_length(columns)) for name, columns in shared},
         )
 
     @property
@@ -227,10 +226,7 @@ class LengthCheck:
     def _covariance(self) -> Array:
         """(3 n, 3 n) of the places of all records, mm^2."""
         size = 3 * len(self.records)
-        covariance = np.zeros((len(self.records), 3, len(self.records), 3))
-        each = np.arange(len(self.records))
-        covariance[each, :, each] = self.noise
-        together: Array = covariance.reshape(size, size)
+        together: Array = each_alone(self.noise).reshape(size, size)
         for error in self.errors:
             columns = error.columns.reshape(size, -1)
             together = together + columns @ columns.T

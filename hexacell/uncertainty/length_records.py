@@ -109,9 +109,7 @@ class JudgedGeometry:
         rows = mechanism.convention.free_rows
         is_length = np.array([parameters[row].kind.unit is ParameterUnit.MM for row in rows])
         smaller = -1e-6 * mechanism.convention.free_parameters(geometry) * is_length
-        return replace(
-            self, parameter_columns={**self.parameter_columns, COMMON_SCALE: smaller[:, np.newaxis]}
-        )
+        return replace(self, parameter_columns={**self.parameter_columns, COMMON_SCALE: smaller[:, None]})
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -193,8 +193,7 @@ class ExcessTest:
     @property
     def down(self) -> Array:
         """Where weights pull (3,): along the gauge z, in the convention's base frame."""
-        down: Array = -self.found.problem.gauges[:, 2]
-        return down
+        return np.asarray(-self.found.problem.gauges[:, 2])
 
     def by_clearance(self) -> list[Array]:
         """Legs that are longer or shorter as the platform's weight pulls or pushes them."""
@@ -224,11 +223,10 @@ class ExcessTest:
         """Each part, and each leg, that expands evenly from the first record to the last."""
         placement = self.found.placement
         parameters, vector = placement.mechanism.parameters, placement.geometry.vector
-        changes = [
-            parameters.by_kind({kind.symbol: float(kind.part is part) for kind in parameters.kinds})
-            * vector
-            for part in MachinePart
-        ]
+        parts = (
+            {kind.symbol: float(kind.part is part) for kind in parameters.kinds} for part in MachinePart
+        )
+        changes = [parameters.by_kind(expands) * vector for expands in parts]
         progress = np.linspace(-0.5, 0.5, len(placement))[:, None, None]
         by_parts = placement.by_parameters(np.stack(changes, axis=-1))
         return [progress * by_parts[:, :3], progress * placement.by_constraints[:, :3]]
@@ -243,9 +241,8 @@ class ExcessTest:
         """The largest decrease of the chi-square by one of the columns alone, and which."""
         by_causes, remaining, values = self._beside_parameters(columns)
         squares = np.sum(by_causes * remaining, axis=0)
-        gains = np.where(
-            squares > SMALLEST_REMAINDER, (remaining.T @ values) ** 2 / np.maximum(squares, 1e-300), 0.0
-        )
+        gains = (remaining.T @ values) ** 2 / np.maximum(squares, 1e-300)
+        gains = np.where(squares > SMALLEST_REMAINDER, gains, 0.0)
         best = int(np.argmax(gains))
         return float(gains[best]), best
 

@@ -201,10 +201,8 @@ def _poor_repeatability(assessed: Assessment) -> str:
 
 def _noise(assessed: Assessment) -> str:
     """The noise levels, where the residuals contradict the stated ones."""
-    if assessed.noise is None or assessed.found.goodness.agreement in {
-        ChiSquareVerdict.AGREES,
-        ChiSquareVerdict.NOT_EVALUATED,
-    }:
+    no_contradiction = {ChiSquareVerdict.AGREES, ChiSquareVerdict.NOT_EVALUATED}
+    if assessed.noise is None or assessed.found.goodness.agreement in no_contradiction:
         return ""
     return noise_sentence(assessed.noise)
 

@@ -52,15 +52,11 @@ def model_tests(found: Identification, updated: Identification) -> tuple[ModelTe
     points = leave_one_point_out(found)
     held_out = ~np.isin(updated.problem.labels[:, 0], found.problem.labels[:, 0])
     predicted = prediction_test(updated, held_out)
+    is_predicted = predicted.probability >= SMALLEST_PROBABILITY
     return (
         _model_test("residuals", found.goodness, "The residuals", passed=found.goodness.is_explained),
         # Records that are too close to their prediction are no evidence against the model.
-        _model_test(
-            HELD_OUT,
-            predicted,
-            "The held-out records",
-            passed=predicted.probability >= SMALLEST_PROBABILITY,
-        ),
+        _model_test(HELD_OUT, predicted, "The held-out records", passed=is_predicted),
         *(
             _model_test(
                 f"point {one.point} from the others",

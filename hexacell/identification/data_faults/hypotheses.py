@@ -1,10 +1,5 @@
 """Hypotheses on what is wrong with some records: what each changes, and how likely the records make it.
 
-There are three kinds. A gross error concerns single records, which disagree with all the others. When the
-zero of the gauges shifts, all later records of the point are off by one constant. A gauge fault (gauges
-exchanged, reversed or reading in inches) is a known matrix T: the readings were d and should have been T
-d.
-
 Score tests (:func:`rank_hypotheses`) need no second fit. An unknown b that adds ``Z b`` to the residuals r
 of a linear model has the estimate and the gain, the decrease of the chi-square,
 
@@ -14,8 +9,9 @@ with M of :class:`.LinearizedModel`, of which only the blocks of the records con
 
 - one record, along one gauge or in any direction: a gross error;
 - one constant for a record and all later ones of its point: a shift of the gauges' zero;
-- a known change of the readings, with no unknown: a gauge fault. Readings d should have been T d, so that
-  the residuals change by ``z = -(T - 1) d`` and the chi-square by ``2 z^T M r + z^T M z``.
+- a known change of the readings, with no unknown: a gauge fault (gauges exchanged, reversed or reading in
+  inches). Readings d should have been T d with a matrix T, so that the residuals change by
+  ``z = -(T - 1) d`` and the chi-square by ``2 z^T M r + z^T M z``.
 
 Source: Rao, Proc. Cambridge Phil. Soc. 44, 1948 (score test).
 """

@@ -57,8 +57,7 @@ def _agrees(problem: Problem, gauges: Mask, factor: float) -> bool:
     """Whether all records agree with the noise once the readings of some gauges are multiplied."""
     fault = GaugeFault(DataFaultKind.UNIT, _gauges(gauges), np.diag(np.where(gauges, factor, 1.0)))
     in_mm = GaugeFaultHypothesis(gain=0.0, unknowns=0, gauge_fault=fault, point=None)
-    corrected = in_mm.corrected(problem)
-    return problem.is_overdetermined and CorrectedFit.uncorrected(corrected).is_consistent
+    return problem.is_overdetermined and CorrectedFit.uncorrected(in_mm.corrected(problem)).is_consistent
 
 
 def _gauges(which: Mask) -> str:

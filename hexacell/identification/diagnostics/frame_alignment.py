@@ -31,18 +31,12 @@ from hexacell.kinematics.mechanism import Branch, FrameFreedom, Mechanism
 from hexacell.kinematics.pose import FrameTransform, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 
-ALIGNMENT_ITERATIONS = 20
-ALIGNMENT_TOLERANCE = 1e-12
-"""Convergence: largest rotation, rad, and largest shift divided by the length."""
-
-CHOICE_ITERATIONS = 50
-CHOICE_TOLERANCE = 1e-13
+ALIGNMENT_ITERATIONS, CHOICE_ITERATIONS = 20, 50
+ALIGNMENT_TOLERANCE, CHOICE_TOLERANCE = 1e-12, 1e-13
 """Convergence: largest turn, rad, and largest shift divided by the length."""
 
 UNDETERMINED = 0.01
-"""Changes that move the taught poses by less than this share of what others do are not made.
-
-Poses in one place, for example, do not distinguish turns of the base frame and of the platform frame."""
+"""Changes that move the taught poses by less than this share of what others do are not made."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,10 +108,8 @@ class FrameFit:
 
     def remove_frame_motion(self, poses: PoseBatch, errors: Array, workspace_errors: Array) -> Array:
         """Errors (k, 6, ...) of other poses minus what the best frames explain, to first order."""
-        explained: Array = np.tensordot(
-            frame_derivatives(poses), self.coefficients(workspace_errors), axes=1
-        )
-        return errors - explained
+        best = self.coefficients(workspace_errors)
+        return np.asarray(errors - np.tensordot(frame_derivatives(poses), best, axes=1))
 
     def aligned(self, reached: PoseBatch, others: PoseBatch) -> PoseBatch:
         """Poses ``others`` in the frames that fit ``reached`` to the workspace best (Gauss-Newton)."""

@@ -112,9 +112,8 @@ def placement_of(belief: RobotBelief, poses: PoseBatch) -> Placement:
 
 def teachable_frames(belief: RobotBelief, workspace: PoseBatch) -> FrameFit:
     """The frames that are fitted over workspace poses: those that can be taught to the controller."""
-    return FrameFit(
-        workspace, float(belief.mechanism.platform_radius(belief.estimate)), belief.work_frame_turns
-    )
+    radius = float(belief.mechanism.platform_radius(belief.estimate))
+    return FrameFit(workspace, radius, belief.work_frame_turns)
 
 
 def _reached(belief: RobotBelief, commanded: PoseBatch) -> tuple[PoseBatch, Mask]:

@@ -67,7 +67,6 @@ ROUNDING = 1e-4
 SMALLEST_ERRORS = 0.03
 """Weight of errors as large as their tolerances, in standard deviations: it only chooses among equals."""
 
-
 Joint = tuple[ParameterKind, int]
 """The numbers of one kind of one leg, counted from 1."""
 
@@ -109,10 +108,8 @@ def _named(fitter: ToleranceFitter, fit: ToleranceFit) -> tuple[ToleranceViolati
     """The violations of joints without whose tolerances there is a robot; ``fit`` is within all of them."""
     faults, others = list[Joint](), list[Joint]()
     while fit.is_contradicted:
-        tried = {
-            joint: fitter.fit(fit.frames, _rows(fitter, [*faults, joint]))
-            for joint in _pressing(fitter, fit)
-        }
+        pressing = {joint: _rows(fitter, [*faults, joint]) for joint in _pressing(fitter, fit)}
+        tried = {joint: fitter.fit(fit.frames, rows) for joint, rows in pressing.items()}
         best = min(tried, key=lambda joint: tried[joint].distance)
         as_well = tried[best].distance + SIGNIFICANT_SIGMAS**2
         others = [

@@ -51,10 +51,8 @@ def _on_either_side(weight: Weight, placement: Placement, _directions: Array, si
     for leg in range(LEGS):
         alone = sides * np.where(np.arange(LEGS) == leg, -1.0, 1.0)
         may |= (_sides_at(placement, sides, alone, sizes_mm, weight) != sides).any(axis=1)
-    places = {
-        row: _other_places(placement, row, forces[row], sizes_mm, weight)
-        for row in np.flatnonzero(may).tolist()
-    }
+    rows = np.flatnonzero(may).tolist()
+    places = {row: _other_places(placement, row, forces[row], sizes_mm, weight) for row in rows}
     errors = np.zeros((*forces.shape, max(map(len, places.values()), default=0)))
     for row, others in places.items():
         errors[row, :, : len(others)] = (sides[row] - others).T

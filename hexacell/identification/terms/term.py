@@ -61,10 +61,6 @@ class ModelTerm:
         """The term with coefficients (6,) as they were identified, with what is not known of them."""
         return replace(self, mean=values, sigma=sigma)
 
-    def times(self, factor: float) -> ModelTerm:
-        """The same term of another size."""
-        return replace(self, size=factor * self.size)
-
     @property
     def spread(self) -> Array:
         """(6, k) coefficients by one standard deviation of each independent part."""

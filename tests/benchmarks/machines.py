@@ -1,6 +1,7 @@
 """Robots, calibrations of them and processes that several benchmarks share."""
 
 import os
+import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
@@ -22,6 +23,7 @@ from hexacell.kinematics.mechanism import free_parameter_derivatives
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.model import Robot, robot_of
 from hexacell.robot.virtual_robot import VirtualRobot, random_robot
+from tests.benchmarks.figures import Target, at_most
 
 Job = TypeVar("Job")
 Outcome = TypeVar("Outcome")
@@ -30,12 +32,33 @@ EFFORT = SearchEffort(candidates=128)
 STATED_DRIFT_MM = 0.02
 """What the cell file states a parameter may have drifted, one sigma."""
 
+SMALL_SOLVES, REPEATS = 1000, 5
+REFERENCE_S = 0.0079
+"""What numpy takes for so many small solves where a late decision took 15 ms, 1.9 times as long."""
+
 
 def on_all_cores(act: Callable[[Job], Outcome], jobs: Iterable[Job], together: int = 1) -> list[Outcome]:
     """What comes of all jobs, in their order, in processes that have all that this one has."""
     cores = len(os.sched_getaffinity(0))
     with ProcessPoolExecutor(cores, mp_context=get_context("fork")) as pool:
         return list(pool.map(act, jobs, chunksize=together))
+
+
+def reference_seconds() -> float:
+    """Numpy's processor time for many solves of a few 6 x 6 systems, the quickest of some repetitions."""
+    matrices, values = np.eye(6) + 0.01 * np.ones((12, 6, 6)), np.ones((12, 6, 1))
+    taken = []
+    for _ in range(REPEATS):
+        begun = time.process_time()
+        for _ in range(SMALL_SOLVES):
+            np.linalg.solve(matrices, values)
+        taken.append(time.process_time() - begun)
+    return min(taken)
+
+
+def at_most_here(seconds: float, unit: float = 1.0) -> Target:
+    """A target of time, as long as it is on a machine of this one's speed; ``unit`` s is the figure's."""
+    return at_most(seconds / unit * reference_seconds() / REFERENCE_S)
 
 
 def bundled(name: str = "simulated-hexaglide") -> Cell:

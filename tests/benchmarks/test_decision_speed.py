@@ -19,13 +19,11 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import robot_of
 from hexacell.robot.virtual_robot import VirtualRobot
 from tests.benchmarks.figures import at_most
-from tests.benchmarks.machines import bundled
+from tests.benchmarks.machines import bundled, reference_seconds
 from tests.benchmarks.virtual_calibration import robot_that_reaches
 
 LATE = range(44, 55)
 REPEATS = 5
-MOST_MS = 15.0
-SMALL_SOLVES = 1000
 MOST_REFERENCES = 1.9
 
 Moment = tuple[Plan, CampaignState, MeasurePose]
@@ -66,21 +64,9 @@ def seconds_of(moment: Moment) -> float:
     return min(taken)
 
 
-def reference_seconds() -> float:
-    """numpy's time for many solves of a few 6 x 6 systems, the quickest of as many repetitions."""
-    matrices, values = np.eye(6) + 0.01 * np.ones((12, 6, 6)), np.ones((12, 6, 1))
-    taken = []
-    for _ in range(REPEATS):
-        begun = time.process_time()
-        for _ in range(SMALL_SOLVES):
-            np.linalg.solve(matrices, values)
-        taken.append(time.process_time() - begun)
-    return min(taken)
-
-
 def test_a_late_decision(figure) -> None:
     # The reference right after each decision: a machine that others use is not always as fast.
     timed = np.array([(seconds_of(moment), reference_seconds()) for moment in late_moments()])
     multiple = float(np.median(timed[:, 0] / timed[:, 1]))
-    figure("a decision at 44 to 54 records", 1e3 * float(np.median(timed[:, 0])), "ms", at_most(MOST_MS))
+    figure("a decision at 44 to 54 records", 1e3 * float(np.median(timed[:, 0])), "ms")
     figure("as a multiple of 1,000 small solves", multiple, "", at_most(MOST_REFERENCES))

@@ -16,7 +16,8 @@ import pytest
 
 from procedures.journal.journal import read_journal
 from procedures.steps import events
-from tests.benchmarks.figures import Figures, at_most
+from tests.benchmarks.figures import Figures
+from tests.benchmarks.machines import at_most_here
 from tests.benchmarks.samples import sample
 from tests.screen.served_cell import NAME, served_in
 
@@ -101,9 +102,9 @@ def test_start_first_visits_and_quitting(served: Path, figure: Figures) -> None:
             found.append((first, live, max(screen.answered_s(key) for key in "23451"), screen.quit_s("q")))
     first, live, key, quitting = map(min, zip(*found, strict=True))
     figure("screen: first drawn", first, "s")
-    figure("screen: live readings", live, "s", at_most(LIVE_S))
-    figure("screen: first visit to a screen, slowest of five", 1e3 * key, "ms", at_most(1e3 * KEY_S))
-    figure("screen: quitting", quitting, "s", at_most(QUIT_S))
+    figure("screen: live readings", live, "s", at_most_here(LIVE_S))
+    figure("screen: first visit to a screen, slowest of five", 1e3 * key, "ms", at_most_here(KEY_S, 1e-3))
+    figure("screen: quitting", quitting, "s", at_most_here(QUIT_S))
 
 
 def identifies(run: Path) -> bool:
@@ -133,7 +134,7 @@ def test_while_a_run_goes_on(served: Path, figure: Figures, what: str) -> None:
             keys += [screen.answered_s(key) for key in "21435"]
         quitting = screen.quit_s("q", "s")
     usual, slow = median(keys), sorted(keys)[int(0.95 * len(keys))]
-    figure(f"screen: a key answered while {what}, median", 1e3 * usual, "ms", at_most(1e3 * KEY_S))
-    figure(f"screen: 95 % of keys while {what} within", 1e3 * slow, "ms", at_most(1e3 * KEY_S))
+    figure(f"screen: a key answered while {what}, median", 1e3 * usual, "ms", at_most_here(KEY_S, 1e-3))
+    figure(f"screen: 95 % of keys while {what} within", 1e3 * slow, "ms", at_most_here(KEY_S, 1e-3))
     figure(f"screen: slowest of the keys while {what}", 1e3 * max(keys), f"ms, {len(keys)} keys")
-    figure(f"screen: quitting while {what}", quitting, "s", at_most(QUIT_S))
+    figure(f"screen: quitting while {what}", quitting, "s", at_most_here(QUIT_S))

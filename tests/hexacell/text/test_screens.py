@@ -5,7 +5,6 @@ from pathlib import Path
 
 from drivers.interfaces import EncoderSample
 from hexacell.cell.recovery import Action, FailureKind
-from hexacell.checks.check_result import CheckResult, ParameterChange
 from hexacell.kinematics.pose import Pose
 from hexacell.run_process.messages import (
     ControlChanged,
@@ -18,7 +17,6 @@ from hexacell.run_process.messages import (
     RunDescribed,
     Shown,
 )
-from hexacell.text.parameters import parameter_table, rows_of_run
 from hexacell.text.screens.live import device_lines, mounting_advice
 from hexacell.text.screens.measuring import fault_view, guidance, record_lines
 from hexacell.text.screens.reviewing import review_texts
@@ -26,7 +24,6 @@ from hexacell.text.screens.run_picture import RunPicture, Setback, picture_after
 from hexacell.verdict.decision import Verdict
 from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import ask_placement
-from procedures.run.state import fold
 from procedures.run.trips import Guard
 from procedures.steps import events
 from procedures.steps.move import Expectation, Move
@@ -146,19 +143,6 @@ def test_a_fault_has_its_cause_and_the_next_action() -> None:
         view = fault_view(setback)
         assert (view.title, view.action) == (title, action)
         assert view.cause.endswith("why")
-
-
-def test_a_check_shows_what_has_changed() -> None:
-    changes = (
-        ParameterChange(name="S1y", unit="mm", change=0.12, sigma=0.02),
-        ParameterChange(name="l4", unit="mm", change=-0.01, sigma=0.02),
-    )
-    check = CheckResult(verdict=Verdict.PASS, records=16, points=4, changes=changes)
-    judged = events.ResultValidated(verdict=Verdict.PASS, line="pass", check=check)
-    assert parameter_table(rows_of_run(fold([judged]), None))[1:] == (
-        "S1y                               +0.120    0.020  changed (6.0 sigma)",
-        "l4                                -0.010    0.020  unchanged (0.5 sigma)",
-    )
 
 
 def test_every_verdict_is_said_in_words_with_its_scope() -> None:

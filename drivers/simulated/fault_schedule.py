@@ -98,23 +98,24 @@ class FaultSchedule(Closeable):
         self._timers: list[threading.Timer] = []
         self._is_closed = False
         self._lock, self._one_at_a_time = threading.Lock(), threading.Lock()
-        for fault in planned:
-            self.schedule(fault)
+        self.schedule(*planned)
 
-    def schedule(self, fault: SimulatedFault) -> None:
-        """Schedule a fault: in a move, some time after now, or at once: then it is there on return.
+    def schedule(self, *planned: SimulatedFault) -> None:
+        """Schedule faults: in a move, some time after now, or at once: then they are there on return.
 
         Raises:
-            UsageError: it cannot be simulated.
+            UsageError: one cannot be simulated.
         """
-        self._faults.check(fault.kind, fault.device)
+        for fault in planned:
+            self._faults.check(fault.kind, fault.device)
         with self._lock:
-            if fault.at_move is not None:
-                self._waiting.append(fault)
-                return
-            timers = self._enqueue(fault)
-        if timers and not fault.after_s:
-            timers[0].join()
+            now_s = self._clock.now()
+            self._waiting += [fault for fault in planned if fault.at_move is not None]
+            timed = [fault for fault in planned if fault.at_move is None]
+            started = [(fault, self._enqueue(fault, now_s)) for fault in timed]
+        for fault, timers in started:
+            if timers and not fault.after_s:
+                timers[0].join()
 
     def on_motion_start(self) -> None:
         """Count a move, and schedule the faults that wait for it."""
@@ -122,7 +123,7 @@ class FaultSchedule(Closeable):
             self.move_count += 1
             for fault in [fault for fault in self._waiting if fault.at_move == self.move_count]:
                 self._waiting.remove(fault)
-                self._enqueue(fault)
+                self._enqueue(fault, self._clock.now())
 
     def close(self) -> None:
         with self._lock:
@@ -131,13 +132,13 @@ class FaultSchedule(Closeable):
             timer.cancel()
             timer.join()
 
-    def _enqueue(self, fault: SimulatedFault) -> list[threading.Timer]:
+    def _enqueue(self, fault: SimulatedFault, now_s: float) -> list[threading.Timer]:
         switches = [(fault.after_s, self._faults.inject)]
         if fault.lasts_s is not None:
             switches.append((fault.after_s + fault.lasts_s, self._faults.clear))
         timers = []
         for after_s, switch in switches if not self._is_closed else ():
-            due_s, carry_out = self._clock.now() + after_s, partial(switch, fault.kind, fault.device)
+            due_s, carry_out = now_s + after_s, partial(switch, fault.kind, fault.device)
             self._due.append((due_s, carry_out))
             timers.append(threading.Timer(self._clock.real_seconds(after_s), self._do_next))
             timers[-1].start()

@@ -51,8 +51,9 @@ def select_validation_poses(
         raise LimitError(f"the actual pose at the command {poses.pose(0)} is not within the limits")
     selected = _select_farthest(belief, poses[inside], actual.poses[inside], used, count)
     if len(selected) < count:
-        kept = f"only {len(selected)} orientations at {poses.pose(0)}"
-        raise LimitError(f"{kept} keep the ball inside the travel")
+        raise LimitError(
+            f"only {len(selected)} orientations at {poses.pose(0)} keep the ball inside the travel"
+        )
     return poses[inside][selected]
 
 

@@ -29,8 +29,8 @@ from hexacell.kinematics.pose import Pose
 from tests.drivers.encoders.dbc.conftest import SIGNALS, dbc_text
 from tests.drivers.simulated.linuxcnc.conftest import QUICK, FakeMachine
 
-TIMEOUT_S = 1.0
-CAN_TIMEOUT_S = 0.6
+TIMEOUT_S = 3.0
+CAN_TIMEOUT_S = 1.5
 
 
 class Cia406(EncoderConformance):

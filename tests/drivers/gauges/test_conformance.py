@@ -25,7 +25,7 @@ class OfProtocol(GaugeConformance):
         return gauge
 
     def twin(self) -> AbstractContextManager[GaugeTwin]:
-        stated: dict[str, Any] = {"name": "x", "axis": "x", "protocol": self.protocol, "timeout_s": 0.4}
+        stated: dict[str, Any] = {"name": "x", "axis": "x", "protocol": self.protocol, "timeout_s": 1.5}
         stated |= {"channel": CHANNEL, "delay_s": STREAM_DELAY_S}
         return served_twin(GaugeSettings(**stated, **described(self.protocol, CHANNEL)))
 

@@ -1,6 +1,7 @@
 """A folder with the demo's cell, and what makes it quick or short."""
 
 import json
+import re
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -95,6 +96,12 @@ class CellFolder:
 
     def edit(self, *edits: tuple[str, str]) -> None:
         self.cell.write_text(changed(self.cell.read_text(), edits))
+
+    def without_simulation(self, bus: str = '{ interface = "virtual" }') -> None:
+        """The same cell with devices of its own, which are not there."""
+        text = self.cell.read_text()
+        text = text[: text.index("[simulation]")].replace("[encoders]", f"[encoders]\nbus = {bus}")
+        self.cell.write_text(re.sub(r'protocol = "(sylvac|mux10|cdi)"', r'\g<0>\nport = "/dev/\1"', text))
 
     def wait_long_for_devices(self) -> None:
         """Let a busy machine take its time."""

@@ -11,6 +11,7 @@ import pytest
 
 from drivers.simulated.robot import SimulatedMachine
 from hexacell import services
+from hexacell.cell.loader import Cell, load_cell
 from hexacell.cli.app import main
 from hexacell.runs.archive import INDEX
 from procedures.journal.journal import read_journal
@@ -28,6 +29,12 @@ def cell_folder(tmp_path: Path) -> CellFolder:
     folder = tmp_path / "cell"
     folder.mkdir()
     return copy_cell(folder)
+
+
+@pytest.fixture
+def cell(cell_folder: CellFolder) -> Cell:
+    """The same, loaded."""
+    return load_cell(cell_folder.cell)
 
 
 @pytest.fixture

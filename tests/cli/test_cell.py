@@ -98,12 +98,8 @@ def test_files_that_are_not_there(typed_here, cell_folder):
 
 
 def test_a_real_cell_cannot_be_simulated(typed_here, cell_folder):
-    text = cell_folder.cell.read_text()
-    text = text[: text.index("[simulation]")]
-    for protocol, port in (("sylvac", "/dev/a"), ("mux10", "/dev/b"), ("cdi", "/dev/c")):
-        text = text.replace(f'protocol = "{protocol}"', f'protocol = "{protocol}"\nport = "{port}"')
-    text = text.replace("[encoders]", '[encoders]\nbus = { interface = "virtual" }')
-    cell_folder.cell.write_text(text.replace("[controller]", "[controller]\nport = 1"))
+    cell_folder.without_simulation()
+    cell_folder.edit(("[controller]", "[controller]\nport = 1"))
     outcome = typed_here("simulate", cell_folder.cell)
     assert (outcome.code, outcome.out) == (2, "")
     assert f"{cell_folder.cell}: there is no [simulation] in it" in outcome.err

@@ -1,8 +1,5 @@
 """``apply`` and ``rollback`` as they are typed."""
 
-import pytest
-
-from hexacell.cell.loader import load_cell
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from tests.cli.terminal import ended
 from tests.hexacell.services.proposed_runs import MET, propose_run
@@ -12,11 +9,6 @@ GRAVE = AcceptanceGate(
 )
 KEYS_APPLIED = {"applied", "by", "config", "further_configs", "run", "sha256", "teach", "recorded"}
 KEYS_RESTORED = {"restored", "config", "further_configs", "from", "undone", "recorded"}
-
-
-@pytest.fixture
-def cell(cell_folder):
-    return load_cell(cell_folder.cell)
 
 
 def test_programs_get_one_document(cell, typed_here) -> None:

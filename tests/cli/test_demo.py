@@ -6,6 +6,7 @@ import re
 import shutil
 import tomllib
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -177,10 +178,7 @@ def test_an_earlier_demo_stays_if_the_cell_is_unknown_or_it_still_runs(typed_her
 
 
 def test_an_earlier_demo_is_replaced(typed_here, earlier, monkeypatch):
-    def end(*_: object) -> None:
-        raise Interruption("over")
-
-    monkeypatch.setattr("hexacell.cli.commands.run.execute_run", end)
+    monkeypatch.setattr("hexacell.cli.commands.run.execute_run", Mock(side_effect=Interruption("over")))
     assert "TCP controller" in typed_here("demo").out
     assert (earlier / "simulated-hexaglide.toml").is_file()
     assert b"precious" not in CellFolder(earlier).snapshot().values()

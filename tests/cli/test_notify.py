@@ -1,6 +1,7 @@
 """Unattended runs tell who the cell file names; and ``hexacell notify`` lists, tries and sends."""
 
 import json
+from unittest.mock import Mock
 
 import pytest
 
@@ -71,10 +72,7 @@ def test_a_run_that_cannot_begin_is_told_too(typed_here, quick_cell) -> None:
 def test_what_happens_while_it_is_told_leaves_the_exit_code(
     typed_here, quick_cell, monkeypatch, raised, told
 ) -> None:
-    def fail(*_: object) -> None:
-        raise raised
-
-    monkeypatch.setattr("hexacell.cli.commands.unattended.notify_all", fail)
+    monkeypatch.setattr("hexacell.cli.commands.unattended.notify_all", Mock(side_effect=raised))
     tell(quick_cell, "hall", "http://127.0.0.1:1/")
     with cell_lock(quick_cell.controller):
         outcome = typed_here("run", quick_cell.cell, *CHECK)

@@ -33,10 +33,10 @@ def test_without_posix_every_command_says_that_it_needs_it_but_for_help(tmp_path
     for command in (["run", "cell.toml"], ["cell", "schema"]):
         ended = typed(LIKE_WINDOWS, tmp_path, *command)
         assert ended.returncode == 2
-        assert ended.stderr == (
-            "hexacell: this system has no POSIX file locks, terminals and signals, by which hexacell "
-            "protects a cell. Use Linux; on Windows install it there with `wsl --install`\n"
+        assert ended.stderr.startswith(
+            "hexacell: this system has no POSIX file locks, terminals and signals"
         )
+        assert (ended.stderr.count("\n"), "`wsl --install`" in ended.stderr) == (1, True)
     for command in (["run", "--help"], ["completion", "bash"]):
         ended = typed(LIKE_WINDOWS, tmp_path, *command)
         assert (ended.returncode, ended.stderr) == (0, "")
@@ -46,8 +46,6 @@ def test_without_posix_every_command_says_that_it_needs_it_but_for_help(tmp_path
 def test_only_a_run_in_another_process_needs_a_socket_that_tells_its_peer(tmp_path):
     ended = typed(LIKE_MACOS, tmp_path, "tui", "cell.toml")
     assert ended.returncode == 2
-    assert ended.stderr.startswith(
-        "hexacell: this system does not report as Linux does who is at the other end"
-    )
+    assert ended.stderr.startswith("hexacell: this system does not report as Linux does")
     assert ended.stderr.endswith("Use `hexacell run` at this terminal, or Linux\n")
     assert typed(LIKE_MACOS, tmp_path, "cell", "schema").returncode == 0

@@ -3,7 +3,6 @@
 import os
 import pty
 import re
-import socket
 import tty
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +12,7 @@ import pytest
 
 from drivers.simulated.cell import SimulatedCell
 from tests.drivers.simulated.encoders import faults
+from tests.hexacell.services.notify.local_servers import closed_port
 
 COMMANDS = ["preflight", "run"]
 
@@ -112,27 +112,17 @@ def test_two_gauges_with_their_cables_swapped(typed_here, served):
     refused(typed_here, served, "preflight", 3, "gauge x", "gauge z", "port")
 
 
-@pytest.fixture
-def closed_port() -> int:
-    """A TCP port on which nothing listens."""
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return int(server.getsockname()[1])
-
-
-def without_controller(served: Any, closed_port: int) -> None:
-    text = served.cell.read_text()
-    served.cell.write_text(re.sub(r"(?m)^port = \d+$", f"port = {closed_port}", text))
-
-
 @pytest.mark.parametrize("command", COMMANDS)
-def test_several_failures_are_reported_at_once(typed_here, served, closed_port, command):
+def test_several_failures_are_reported_at_once(typed_here, served, command):
+    nobody = closed_port()
     served.edit(
         (port_of(served, "x"), "/dev/nowhere"),
         ("nodes = [1, 2, 3, 4, 5, 6]", "nodes = [9, 2, 3, 4, 5, 6]"),
         ("[100.0, 100.0, 550.0],", "[100.0, 100.0, 1550.0],"),
     )
-    without_controller(served, closed_port)
-    words = ("gauge x", "leg 1", f"controller 127.0.0.1:{closed_port}", "verification point 2")
+    text = served.cell.read_text()
+    served.cell.write_text(re.sub(r"(?m)^port = \d+$", f"port = {nobody}", text))
+    words = ("gauge x", "leg 1", f"controller 127.0.0.1:{nobody}", "verification point 2")
     message = refused(typed_here, served, command, 3, *words)
     assert message.count("\n  - ") >= len(words)
     advice = "`hexacell devices` shows what is connected" in " ".join(message.split())

@@ -11,9 +11,9 @@ from hexacell.runs.run_folder import RunFolder
 from hexacell.services.run.calibration_run import RunRequest
 from procedures.calibration.calibration import Mode
 from procedures.engine.commands import UnattendedOperator
-from procedures.journal.journal import Journal
 from procedures.steps import events
 from procedures.steps.roll_back import RollBack
+from tests.recorded_events import record
 
 COMMITTED = events.Committed(approved_by="a tester")
 WITHDRAWN = [events.StepBegun(step=RollBack()), events.RolledBack()]
@@ -25,9 +25,7 @@ def test_an_unverified_geometry_is_always_reported(cell_folder, capsys, history,
     """Also if resuming fails before the engine runs."""
     folder = RunFolder(cell_folder.path / "run")
     folder.path.mkdir()
-    with Journal(folder.journal) as journal:
-        for event in history:
-            journal.append(event)
+    record(folder.journal, history)
     cell = load_cell(cell_folder.cell)
     order = RunRequest(cell, folder, Mode.OPTIMISE, UnattendedOperator(), unattended=True, resume=True)
     with cell_lock(cell.config_path), pytest.raises(CellBusy):

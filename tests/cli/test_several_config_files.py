@@ -81,11 +81,6 @@ def test_the_cell_is_checked_with_all_its_files(cell, typed_here) -> None:
     assert valid.code == 0
     assert "hexapod.hal and " in valid.out
     assert "hexapod.ini" in valid.out
-    twice = cell.config_paths[0].read_text() + "setp genhexkins.offset.2 600\n"
-    cell.config_paths[0].write_text(twice)
-    refused = typed_here("cell", "validate", cell.path)
-    assert refused.code == 2
-    assert "offset3 is in hexapod.hal and in hexapod.ini" in refused.err
 
 
 def test_a_kill_between_the_two_is_undone_by_the_next_command(cell, run, typed_here, tmp_path) -> None:

@@ -30,6 +30,7 @@ from procedures.steps import events
 from procedures.workflow.next_step import StepExecutor
 from tests.native_config import NATIVE
 from tests.procedures.fakes import Approver, Bench
+from tests.recorded_events import record
 from tests.small_cell import FEW_CHOICES, SMALL, changed, history_until
 
 
@@ -95,9 +96,7 @@ class Rig:
     def write(self, history: Sequence[events.Event]) -> None:
         """A journal in which all this has happened already."""
         self.folder.path.mkdir(exist_ok=True)
-        with Journal(self.folder.journal) as journal:
-            for event in history:
-                journal.append(event)
+        record(self.folder.journal, history)
 
 
 MakeRig = Callable[..., Rig]

@@ -8,7 +8,8 @@ from hexacell.errors import FileError
 from hexacell.screen.preferences import KEYS, ScreenPreferences, preferences_path, read_preferences
 from procedures.engine.commands import Pause
 from tests.screen.conftest import settled
-from tests.screen.told_run import ToldRun, ToldWorkplace
+from tests.screen.test_job import workplace_of
+from tests.screen.told_run import ToldRun
 from tests.waiting import until
 
 
@@ -44,9 +45,7 @@ def test_the_file_is_where_configs_are(monkeypatch: pytest.MonkeyPatch, tmp_path
 
 async def test_a_chosen_key_takes_the_place_of_the_other(cell, history, opened) -> None:
     run = ToldRun()
-    run.begin(cell)
-    run.record(history[:300])
-    workplace = ToldWorkplace(cell, run=run)
+    workplace = workplace_of(cell, run, history[:300])
     async with opened(workplace, preferences=ScreenPreferences({"pause": "f5", "review": "f8"})) as pilot:
         await pilot.press("p")
         await settled(pilot)

@@ -29,7 +29,7 @@ from procedures.run.trips import Guard
 from procedures.steps import events
 from tests.screen.conftest import SNAPSHOTS, UPDATE, compare_with_snapshot, settled
 from tests.screen.test_found_terms import told
-from tests.screen.test_job import until_shown
+from tests.screen.test_job import until_shown, workplace_of
 from tests.screen.test_plan_screen import tried
 from tests.screen.told_run import ToldRun, ToldWorkplace, past_run, snapshot
 from tests.waiting import until
@@ -93,10 +93,7 @@ def idle(cell: Cell) -> ToldWorkplace:
 
 def running(cell: Cell, history: History, count: int) -> tuple[ToldRun, ToldWorkplace]:
     run = ToldRun()
-    run.begin(cell)
-    run.record(history[:count])
-    run.tell(snapshot())
-    return run, ToldWorkplace(cell, run=run)
+    return run, workplace_of(cell, run, history[:count])
 
 
 History = tuple[events.Event, ...]

@@ -21,9 +21,7 @@ async def test_an_emergency_makes_samples_invalid_until_it_is_cleared(raw, opene
     raw.send(0x83, NO_MAGNET)
     await raw.delivered_to(opened)
     for _ in range(2):
-        with pytest.raises(
-            InvalidSampleError, match=r"leg 3 \(node 3\): reports emergency FF00 \(no magnet"
-        ):
+        with pytest.raises(InvalidSampleError, match=r"leg 3 .*: reports emergency FF00 \(no magnet"):
             await opened.read()
     raw.send(0x83, CLEARED)
     await raw.delivered_to(opened)

@@ -2,6 +2,7 @@
 
 import asyncio
 import threading
+from unittest.mock import Mock
 
 import can
 import pytest
@@ -85,14 +86,9 @@ async def test_closing_ends_reads_in_progress(raw, make_bank):
 
 @pytest.mark.parametrize("where", ["recv", "send"])
 async def test_a_bus_that_fails_is_an_error_with_its_cause(raw, opened, monkeypatch, where):
-    def fail(*_args, **_kwargs):
-        raise can.CanOperationError("adapter gone")
-
     network = opened._session.bus.network
-    monkeypatch.setattr(network.bus, where, fail)
+    monkeypatch.setattr(network.bus, where, Mock(side_effect=can.CanOperationError("adapter gone")))
     for _ in range(2):
-        failed = pytest.raises(
-            BusError, match=r"encoder bus virtual raw-.*adapter gone.*the set .* is void"
-        )
+        failed = pytest.raises(BusError, match=r"bus virtual raw-.*adapter gone.*the set .* is void")
         with short_timeout(opened), failed:
             await opened.read()

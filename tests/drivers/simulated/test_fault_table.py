@@ -226,9 +226,7 @@ def alarms_are_read_with_every_sample(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.slow
-async def test_every_fault_is_seen_or_harmless_as_the_table_says(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+async def test_every_fault_is_seen_or_harmless_as_the_table_says(capsys, tmp_path) -> None:
     found = await _a_few_at_once([gauge_row(*pair) for pair in gauge_pairs()])
     found += [await encoder_row(*pair, tmp_path) for pair in encoder_pairs(tmp_path)]
     made = table_of(found)

@@ -1,14 +1,11 @@
 """Gauges and encoders that follow the joints which another program prints."""
 
-import shutil
 import sys
 
 import numpy as np
 import pytest
 
 from drivers.simulated.followed_controller import FollowedController, JointSource, joints_in
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import load_cell
 from hexacell.cell.simulation import SimulatedFault
 from hexacell.config.layout import ConfigLayout
 from hexacell.errors import UsageError
@@ -53,12 +50,9 @@ def printing(places: np.ndarray, each_s: float) -> tuple[str, ...]:
 
 
 @pytest.fixture
-def followed(tmp_path):
+def followed(bundled_cell):
     """A cell whose joints go through the given poses of its controller."""
-    source = bundled_config("simulated-hexaglide")
-    for file in source.parent.glob(f"{source.stem}*.toml"):
-        shutil.copy(file, tmp_path)
-    cell = load_cell(tmp_path / source.name)
+    cell = bundled_cell
     form = ConfigLayout.of(cell.settings)
     opened: list[FollowedController] = []
 
@@ -140,10 +134,7 @@ def test_a_program_that_ends_is_started_again(tmp_path) -> None:
     [
         ({"simulation.faults": (SimulatedFault(kind="emergency stop"),)}, "only a simulated controller"),
         ({"timing.clock_factor": 10.0}, "no fast clock"),
-        (
-            {"simulation.joints_command": ("halsampler-not-here",)},
-            "there is no program 'halsampler-not-here'",
-        ),
+        ({"simulation.joints_command": ("halsampler-not-here",)}, "no program 'halsampler-not-here'"),
     ],
 )
 def test_what_only_a_simulated_controller_can_is_refused(followed, changes, words) -> None:

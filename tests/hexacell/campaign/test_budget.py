@@ -107,9 +107,7 @@ def test_one_point_takes_at_most_twice_its_own() -> None:
     st.sets(st.integers(1, 5)),
     st.sets(st.integers(1, 5)),
 )
-def test_no_point_gets_fewer_than_planned_and_all_together_no_more(
-    counts: list[int], done: set[int], left: set[int]
-) -> None:
+def test_no_point_gets_fewer_than_planned_and_all_together_no_more(counts, done, left) -> None:
     state = measured(dict(zip(PLANNED, counts, strict=True)), done)
     sizes = shared_sizes(PLANNED, state, left)
     waiting = set(PLANNED) - done - left

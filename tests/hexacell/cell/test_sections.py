@@ -1,7 +1,6 @@
 """Sections of the cell file with rules of their own: what they give, each mistake with its line."""
 
 from datetime import date
-from pathlib import Path
 from typing import get_args
 
 import pytest
@@ -58,9 +57,7 @@ def cell_with(copied):
         ('identify = ["zeros"]', ParameterChoice.ZEROS),
     ],
 )
-def test_the_robot_knows_what_is_identified(
-    cell_with, tmp_path: Path, lines: str, choice: ParameterChoice
-) -> None:
+def test_the_robot_knows_what_is_identified(cell_with, tmp_path, lines, choice) -> None:
     cell = load_cell(cell_with(lines))
     assert robot_of(cell).identifies is choice
     (tmp_path / "again.toml").write_text(describe(cell))

@@ -189,6 +189,11 @@ def config(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
+def proposal(config: Path, geometry: Geometry) -> ConfigChange:
+    return propose((config,), NATIVE, geometry, fingerprint_at_start=fingerprint(config))
+
+
+@pytest.fixture
 def geometry() -> Geometry:
     """What the config above says, each value moved by a number of its own."""
     moved = np.arange(42) * 0.001234567

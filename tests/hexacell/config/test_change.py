@@ -16,14 +16,7 @@ from hexacell.storage import atomic_files
 from tests.native_config import NATIVE
 
 
-@pytest.fixture
-def proposal(config: Path, geometry: Geometry) -> ConfigChange:
-    return propose((config,), NATIVE, geometry, fingerprint_at_start=fingerprint(config))
-
-
-def test_a_proposal_describes_the_change_and_writes_nothing(
-    config: Path, geometry: Geometry, proposal: ConfigChange
-) -> None:
+def test_a_proposal_describes_the_change_and_writes_nothing(config, geometry, proposal) -> None:
     text = config.read_bytes()
     assert proposal.path == config
     assert proposal.sha256_before == atomic_files.sha256(text) == fingerprint(config)

@@ -97,9 +97,7 @@ def geometry_in(text: str) -> Geometry:
 
 
 @given(drawn, drawn, st.sampled_from(["\n", "\r\n"]))
-def test_numbers_that_are_there_change_in_their_places_alone(
-    one: Corrections, other: Corrections, end: str
-) -> None:
+def test_numbers_that_are_there_change_in_their_places_alone(one, other, end) -> None:
     text = (CONFIG + WHOLE).replace("\n", end)
     assert NATIVE.holds == EVERY
     geometry, there = geometry_in(text), read(NATIVE, text)

@@ -156,9 +156,7 @@ def test_a_second_file_that_cannot_be_written_stops_it_before_the_first(
     assert not is_interrupted(bench.files)
 
 
-def test_a_second_file_whose_disk_is_full_takes_the_first_one_back(
-    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_second_file_whose_disk_is_full_takes_the_first_one_back(bench, tmp_path, monkeypatch) -> None:
     real = os.replace
 
     def replace(source: Any, target: Any) -> None:
@@ -207,9 +205,7 @@ def test_a_file_that_is_not_there_is_named(either: Bench, tmp_path: Path, number
     assert all(either.files[one].read_bytes() == either.before[one] for one in others)
 
 
-def test_a_change_by_another_program_between_the_two_is_kept(
-    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_change_by_another_program_between_the_two_is_kept(bench, tmp_path, monkeypatch) -> None:
     """The first file is replaced; before the second one is, somebody saves it in an editor."""
     real, target = os.replace, bench.files[1].resolve()
 

@@ -7,42 +7,16 @@ from pathlib import Path
 import pytest
 
 from hexacell.config import write_back
-from hexacell.config import write_back as replacement
-from hexacell.config.change import ConfigChange, Receipt, propose
-from hexacell.config.layout import fingerprint
+from hexacell.config.change import ConfigChange, Receipt
 from hexacell.config.pending_write import is_interrupted, note_write, settle_interrupted_write
-from hexacell.config.toml_format import native_layout
 from hexacell.config.write_back import commit, rollback
 from hexacell.errors import FileError, WriteBackUndone
-from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from tests.hexacell.config.conftest import Bench, PowerCut
-from tests.native_config import NATIVE
-
-
-def names(folder: Path) -> list[str]:
-    return sorted(path.name for path in folder.iterdir())
-
-
-@pytest.fixture
-def proposal(config: Path, geometry: Geometry) -> ConfigChange:
-    return propose((config,), NATIVE, geometry, fingerprint_at_start=fingerprint(config))
 
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
     return tmp_path / "runs" / "0001"
-
-
-def test_a_commit_writes_what_was_proposed(
-    config: Path, run: Path, geometry: Geometry, proposal: ConfigChange
-) -> None:
-    config.chmod(0o640)
-    commit(proposal, run)
-    assert config.read_bytes() == proposal.text_after.encode()
-    assert native_layout(HEXAGLIDE_PARAMETERS).read(config).geometry.largest_difference(geometry) <= 5e-7
-    assert config.stat().st_mode & 0o777 == 0o640
-    assert names(config.parent) == [config.name]
 
 
 def test_rollback_works_from_a_moved_run_folder(config: Path, run: Path, proposal: ConfigChange) -> None:
@@ -52,9 +26,7 @@ def test_rollback_works_from_a_moved_run_folder(config: Path, run: Path, proposa
     assert config.read_bytes() == proposal.text_before.encode()
 
 
-def test_a_config_that_changes_in_the_last_moment_is_left_alone(
-    config: Path, run: Path, proposal: ConfigChange, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_config_that_changes_in_the_last_moment_is_left_alone(config, run, proposal, monkeypatch) -> None:
     def back_up_slowly(*args: object) -> None:
         config.write_bytes(b"somebody's new work")
 
@@ -62,21 +34,10 @@ def test_a_config_that_changes_in_the_last_moment_is_left_alone(
     with pytest.raises(FileError, match="changed by somebody else"):
         commit(proposal, run)
     assert config.read_bytes() == b"somebody's new work"
-    assert names(config.parent) == [config.name]
+    assert list(config.parent.iterdir()) == [config]
 
 
-def test_a_commit_interrupted_after_the_replacement_is_recognised(
-    config: Path, run: Path, proposal: ConfigChange
-) -> None:
-    receipt = commit(proposal, run)
-    assert commit(proposal, run) == receipt
-    with pytest.raises(FileError, match="changed since the run began"):
-        commit(proposal, run.parent / "another run")
-
-
-def test_a_backup_of_another_version_is_not_overwritten(
-    config: Path, run: Path, proposal: ConfigChange
-) -> None:
+def test_a_backup_of_another_version_is_not_overwritten(config, run, proposal) -> None:
     run.mkdir(parents=True)
     (run / "config-before").write_bytes(b"precious")
     with pytest.raises(FileError, match="backup of another version"):
@@ -93,9 +54,7 @@ def test_a_deleted_config_is_not_brought_back(config: Path, run: Path, proposal:
     assert not config.exists()
 
 
-def test_a_config_that_does_not_read_back_is_restored(
-    config: Path, run: Path, proposal: ConfigChange, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_config_that_does_not_read_back_is_restored(config, run, proposal, monkeypatch) -> None:
     """A disk that garbles the config: the backup is restored, and the garbled file is kept."""
     replace = os.replace
 
@@ -120,15 +79,13 @@ def test_an_interrupt_after_the_replacement_is_undone_and_stays_an_interrupt(
         if expected == proposal.text_after.encode():
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(replacement, "require_written", interrupt)
+    monkeypatch.setattr(write_back, "require_written", interrupt)
     with pytest.raises(KeyboardInterrupt):
         commit(proposal, run)
     assert config.read_bytes() == proposal.text_before.encode()
 
 
-def test_a_backup_that_does_not_read_back_stops_the_commit(
-    config: Path, run: Path, proposal: ConfigChange, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_backup_that_does_not_read_back_stops_the_commit(config, run, proposal, monkeypatch) -> None:
     replace = os.replace
 
     def garble(source: Path, target: Path) -> None:
@@ -155,9 +112,7 @@ def test_any_single_failure_of_a_commit_leaves_the_old_config(either: Bench) -> 
 
 @pytest.mark.sample("one-*", "two-inf")
 @pytest.mark.parametrize("width", [2, 5, math.inf])
-def test_consecutive_failures_leave_what_the_message_says_or_what_is_undone_next(
-    either: Bench, width: float
-) -> None:
+def test_consecutive_failures_leave_what_the_message_says_or_what_is_undone_next(either, width) -> None:
     kept, halves = ["config-before", "config-before-2"][: len(either.files)], 0
     for name, run, raised in either.attempts(either.reset, either.commit, width=width):
         if raised is None:

@@ -64,9 +64,7 @@ def test_without_an_axis_the_command_itself_is_left_out_and_no_other() -> None:
 
 @pytest.mark.parametrize("column", range(6))
 @pytest.mark.parametrize("is_highest", [True, False])
-def test_beyond_the_limit_of_an_axis_all_that_is_as_far_out_is_left_out(
-    column: int, is_highest: bool
-) -> None:
+def test_beyond_the_limit_of_an_axis_all_that_is_as_far_out_is_left_out(column, is_highest) -> None:
     refused = RefusedCommands((RefusedCommand(POSE, "xyzabc"[column], is_highest),))
     outward = 1.0 if is_highest else -1.0
     assert not refused.allows(POSE)
@@ -89,9 +87,7 @@ def test_every_refusal_counts() -> None:
 @pytest.mark.parametrize(
     ("by_mm", "by_deg", "is_near"), [(29.0, 4.9, True), (31.0, 0.0, False), (0.0, 5.1, False)]
 )
-def test_what_is_near_a_command_that_was_taken_out_is_left_out(
-    by_mm: float, by_deg: float, is_near: bool
-) -> None:
+def test_what_is_near_a_command_that_was_taken_out_is_left_out(by_mm, by_deg, is_near) -> None:
     refused = RefusedCommands((RefusedCommand(POSE, within_mm=30.0, within_deg=5.0),))
     x, y, z, a, b, c = POSE
     assert refused.allows((x, y, z + by_mm, a, b, c + by_deg)) is not is_near

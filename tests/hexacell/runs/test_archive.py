@@ -98,13 +98,6 @@ def test_others_may_not_write_it(tmp_path) -> None:
     assert path.stat().st_mode & 0o002 == 0
 
 
-def test_a_server_that_is_not_there_says_so(tmp_path) -> None:
-    url = f"postgresql://nobody@/none?host={tmp_path}"
-    with closing(Archive(tmp_path, "cell", url)) as archive, pytest.raises(ArchiveUnavailable) as raised:
-        archive.documents(SUMMARY)
-    assert "The runs are read from their folders" in str(raised.value)
-
-
 def test_every_change_of_a_folder_shows(tmp_path) -> None:
     run = RunFolder(tmp_path / "a")
     run.path.mkdir()

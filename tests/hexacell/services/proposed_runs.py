@@ -19,8 +19,8 @@ from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.verification import Verification
 from procedures.calibration.calibration import Calibration, Mode
-from procedures.journal.journal import Journal
 from procedures.steps import events
+from tests.recorded_events import record
 from tests.small_cell import FEW_CHOICES
 
 MET = AcceptanceGate(name="converged", passed=True, sentence="It converged.")
@@ -69,9 +69,7 @@ def propose_run(
     start = fingerprint(*cell.config_paths)
     change = propose(cell.config_paths, layout, after, corrections, fingerprint_at_start=start)
     change.save(folder.proposal)
-    with Journal(folder.journal) as journal:
-        for event in _history(cell, change, gates, verdict, verification):
-            journal.append(event)
+    record(folder.journal, _history(cell, change, gates, verdict, verification))
     return ProposedRun(folder, change)
 
 

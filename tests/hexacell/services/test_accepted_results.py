@@ -13,10 +13,10 @@ from hexacell.services.run.accepted_results import last_accepted_result
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.model_evidence import ModelTest
 from hexacell.verdict.verification import Verification
-from procedures.journal.journal import Journal
 from procedures.steps import events
 from tests.hexacell.services.recorded_nights import Nights
 from tests.procedures.story import an_identification
+from tests.recorded_events import record
 
 IDENTIFIED = events.Identified(result=an_identification(), held_out=())
 PASSED = events.ResultValidated(verdict=Verdict.PASS, line="it is good")
@@ -35,9 +35,7 @@ def run(cell: Cell, name: str, *history: events.Event) -> RunFolder:
         backup_folder=folder.path,
     )
     receipt.save(folder.path / RECEIPT)
-    with Journal(folder.journal) as journal:
-        for event in history:
-            journal.append(event)
+    record(folder.journal, history)
     return folder
 
 

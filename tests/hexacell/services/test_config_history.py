@@ -22,9 +22,9 @@ from hexacell.services.write_back.proposals import COMMAND, apply_proposal, read
 from hexacell.verdict.decision import Verdict
 from procedures.engine.commands import UnattendedOperator
 from procedures.journal import journal as journals
-from procedures.journal.journal import Journal
 from procedures.steps import events
 from tests.hexacell.services.proposed_runs import ProposedRun, propose_run
+from tests.recorded_events import record
 
 
 @pytest.fixture
@@ -104,16 +104,12 @@ async def test_a_write_that_cannot_be_recorded_stays_and_is_told(
     run = propose_run(cell)
     elsewhere = tmp_path / "elsewhere"
     elsewhere.write_bytes(b"precious")
-
-    def full(descriptor: int, data: bytes) -> int:
-        raise OSError(28, os.strerror(28))
-
     if obstacle == "a folder":
         records.mkdir(parents=True)
     elif obstacle == "a link":
         records.symlink_to(elsewhere)
     else:
-        monkeypatch.setattr("hexacell.config.write_record.os.write", full)
+        monkeypatch.setattr("hexacell.config.write_record.os.write", Mock(side_effect=OSError(28, "full")))
     told = [await apply(run)]
     assert cell.config_path.read_bytes() == run.after
     told.append(roll_back_config(cell).unrecorded)
@@ -128,12 +124,6 @@ async def test_a_write_that_cannot_be_recorded_stays_and_is_told(
         (known,) = config_history(cell).writes
         assert (known.record.kind, known.record.by) == (WriteKind.APPLIED, COMMAND)
         assert not known.is_recorded
-
-
-def journalled(run: ProposedRun, *more: events.Event) -> None:
-    with Journal(run.folder.journal) as journal:
-        for event in more:
-            journal.append(event)
 
 
 def test_a_provisional_geometry_has_no_verdict(cell) -> None:
@@ -152,10 +142,10 @@ def test_a_provisional_geometry_has_no_verdict(cell) -> None:
 def test_folders_of_before_are_told_by_their_journals(cell) -> None:
     run = propose_run(cell, verdict=None)
     commit(run.change, run.folder.path)
-    journalled(run, events.Committed(approved_by="a tester"))
+    record(run.folder.journal, [events.Committed(approved_by="a tester")])
     cell.config_path.write_bytes(run.before)
     judged = events.ResultValidated(verdict=Verdict.FAIL, line="0.3 mm: fail (worse than before)")
-    journalled(run, judged, events.RolledBack())
+    record(run.folder.journal, [judged, events.RolledBack()])
     back, written = config_history(cell).writes
     assert (written.record.kind, written.record.by) == (WriteKind.RESULT, "a tester")
     assert (written.is_recorded, written.verdict, written.record.user) == (False, Verdict.FAIL, "")
@@ -174,5 +164,5 @@ def test_writes_within_a_millisecond_stay_in_their_order_and_are_told_once(cell,
     with recorded_write(run.folder.siblings, cell.config_paths, ConfigLayout.of(cell.settings), cause):
         commit(run.change, run.folder.path)
     judged = events.ResultValidated(verdict=Verdict.FAIL, line="0.3 mm: fail (worse than before)")
-    journalled(run, events.Committed(approved_by="a tester"), judged, events.RolledBack())
+    record(run.folder.journal, [events.Committed(approved_by="a tester"), judged, events.RolledBack()])
     assert kinds(cell) == [WriteKind.TAKEN_BACK, WriteKind.RESULT]

@@ -13,7 +13,7 @@ from hexacell.services.devices.device_setup import device_addresses, devices_of,
 from hexacell.services.history.recorded_cell import with_changes
 from hexacell.services.run.calibration_run import new_calibration, preflight, run_started
 from procedures.calibration.calibration import Mode
-from procedures.journal.journal import Journal
+from tests.recorded_events import record
 
 
 def test_axes_and_signs_are_the_files(make_site) -> None:
@@ -73,8 +73,7 @@ def cell(make_cell):
 def kept(cell, name: str, *devices: DeviceIdentity) -> RunFolder:
     folder = RunFolder(runs_folder(cell) / name)
     folder.create(cell)
-    with Journal(folder.journal) as journal:
-        journal.append(run_started(cell, new_calibration(cell, Mode.OPTIMISE), devices))
+    record(folder.journal, [run_started(cell, new_calibration(cell, Mode.OPTIMISE), devices)])
     return folder
 
 
@@ -84,9 +83,8 @@ def test_an_encoder_that_was_set_since_the_last_run_is_told(cell) -> None:
     now = replace(ENCODER, settings="preset 500", remark="it reports a warning")
     gauge, encoder = with_changes(cell, (GAUGE, now))
     assert gauge.remark == ""
-    assert encoder.remark == (
-        "it reports a warning; since the run 2026-11-02T000000Z: settings preset 500, which was preset 0"
-    )
+    since = "since the run 2026-11-02T000000Z: settings preset 500, which was preset 0"
+    assert encoder.remark == f"it reports a warning; {since}"
     assert encoder == now, "a remark is not compared"
 
 

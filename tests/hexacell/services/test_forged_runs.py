@@ -12,14 +12,21 @@ from hexacell.services.run.replay_run import replay
 from procedures.journal.journal import Journal
 from procedures.run.keys import Phase, SetKey
 from procedures.steps import events
+from tests.recorded_events import record
 
 History = list[Any]
+Forgery = Callable[[History], None]
+STARTED = events.RunStarted
 
 
 def changed(history: History, kind: type[Any], **changes: Any) -> None:
     """The last event of a kind with other fields."""
     place = max(n for n, event in enumerate(history) if isinstance(event, kind))
     history[place] = history[place].model_copy(update=changes)
+
+
+def other(kind: type[Any], **changes: Any) -> Forgery:
+    return lambda history: changed(history, kind, **changes)
 
 
 def result_changed(history: History, **changes: Any) -> None:
@@ -36,8 +43,12 @@ def reading_changed(history: History, **changes: Any) -> None:
     changed(history, events.RecordTaken, reading=taken.reading.model_copy(update=changes))
 
 
+def first_taken(history: History) -> events.RecordTaken:
+    return next(event for event in history if isinstance(event, events.RecordTaken))
+
+
 def pilot_taken(history: History, orientation: int) -> events.PilotTaken:
-    taken = next(event for event in history if isinstance(event, events.RecordTaken))
+    taken = first_taken(history)
     return events.PilotTaken(at=taken.at, orientation=orientation, pose=taken.pose, reading=taken.reading)
 
 
@@ -45,88 +56,27 @@ FAR = (0.0, 0.0, 5500.0, 0.0, 0.0, 0.0)
 TILTED = (0.0, 0.0, 550.0, 0.0, 46.0, 0.0)
 V9 = SetKey(phase=Phase.BEFORE, point=9)
 
-FORGERIES: dict[str, tuple[Callable[[History], None], str]] = {
-    "another geometry": (
-        lambda h: changed(h, events.RunStarted, controller=scaled(h[0].controller, 1.01)),
-        "states another geometry than",
-    ),
-    "wider joint ranges": (
-        lambda h: changed(h, events.RunStarted, joint_ranges=((-800.0, 800.0),) * 6),
-        "states other limits than",
-    ),
-    "wider limits of the controller": (
-        lambda h: changed(h, events.RunStarted, limits=ControllerLimits(axes=((-1e3, 1e3),) * 6)),
-        "states other limits than",
-    ),
-    "limits of five axes": (
-        lambda h: changed(h, events.RunStarted, limits=ControllerLimits(axes=((-1.0, 1.0),) * 5)),
-        "there are six axes",
-    ),
-    "five joint ranges": (
-        lambda h: changed(h, events.RunStarted, joint_ranges=((-800.0, 200.0),) * 5),
-        "there are six joint ranges",
-    ),
-    "parameters of another machine": (
-        lambda h: changed(h, events.RunStarted, controller={"S": ((1.0, 2.0),)}),
-        "a geometry has other parameters",
-    ),
-    "legs without length": (
-        lambda h: changed(h, events.RunStarted, controller=scaled(h[0].controller, 0.0)),
-        "lengths that are not above zero",
-    ),
-    "a held-out pose out of reach": (
-        lambda h: changed(h, events.Identified, held_out=((FAR, FAR), (FAR, FAR))),
-        "has the pose 0, 0, 5500, 0, 0, 0, which the robot cannot take",
-    ),
-    "a held-out pose beyond the tilt": (
-        lambda h: changed(h, events.Identified, held_out_after=((TILTED,), (TILTED,))),
-        "which the robot cannot take",
-    ),
-    "held-out poses at other points": (
-        lambda h: changed(h, events.Identified, held_out=((FAR,),)),
-        "the held-out poses are not those of the cell file's points",
-    ),
-    "a point that there is not": (
-        lambda h: changed(h, events.RecordTaken, at=V9),
-        "the cell file has no held-out point 9",
-    ),
-    "a record taken twice": (
-        lambda h: h.append(next(one for one in h if isinstance(one, events.RecordTaken))),
-        "orientation 1 is not the next one",
-    ),
-    "a pilot pose after none": (
-        lambda h: h.append(pilot_taken(h, FIRST_PILOT + 1)),
-        "pilot pose 2 is not the next one",
-    ),
-    "a reading that is no number": (
-        lambda h: reading_changed(h, gauges_mm=(float("nan"), 0.0, 0.0)),
-        "nan is not within",
-    ),
-    "five encoders": (
-        lambda h: reading_changed(h, counts=((1, 2, 3, 4, 5),)),
-        "the encoders have other counts",
-    ),
-    "a covariance of another size": (
-        lambda h: result_changed(h, covariance=((1.0,),)),
-        "a covariance has another size",
-    ),
-    "a covariance with negative variances": (
-        lambda h: result_changed(h, covariance=((-1.0,) * 42,) * 42),
-        "this is no covariance",
-    ),
-    "a geometry written without proposal": (
-        lambda h: h.append(events.Committed(approved_by="me")),
-        "'committed' has nothing that it follows from",
-    ),
-    "two starts": (lambda h: h.append(h[0]), "the run was started before"),
-}
-
-
-def rewritten(site: Any, history: History) -> None:
-    site.folder.journal.unlink()
-    with Journal(site.folder.journal) as journal:
-        for event in history:
-            journal.append(event)
+FORGERIES: list[tuple[Forgery, str]] = [
+    (lambda h: changed(h, STARTED, controller=scaled(h[0].controller, 1.01)), "another geometry than"),
+    (other(STARTED, joint_ranges=((-800.0, 800.0),) * 6), "states other limits than"),
+    (other(STARTED, limits=ControllerLimits(axes=((-1e3, 1e3),) * 6)), "states other limits than"),
+    (other(STARTED, limits=ControllerLimits(axes=((-1.0, 1.0),) * 5)), "there are six axes"),
+    (other(STARTED, joint_ranges=((-800.0, 200.0),) * 5), "there are six joint ranges"),
+    (other(STARTED, controller={"S": ((1.0, 2.0),)}), "a geometry has other parameters"),
+    (lambda h: changed(h, STARTED, controller=scaled(h[0].controller, 0.0)), "not above zero"),
+    (other(events.Identified, held_out=((FAR, FAR), (FAR, FAR))), "0, 0, 5500, 0, 0, 0, which the robot"),
+    (other(events.Identified, held_out_after=((TILTED,), (TILTED,))), "which the robot cannot take"),
+    (other(events.Identified, held_out=((FAR,),)), "are not those of the cell file's points"),
+    (other(events.RecordTaken, at=V9), "the cell file has no held-out point 9"),
+    (lambda h: h.append(first_taken(h)), "orientation 1 is not the next one"),
+    (lambda h: h.append(pilot_taken(h, FIRST_PILOT + 1)), "pilot pose 2 is not the next one"),
+    (lambda h: reading_changed(h, gauges_mm=(float("nan"), 0.0, 0.0)), "nan is not within"),
+    (lambda h: reading_changed(h, counts=((1, 2, 3, 4, 5),)), "the encoders have other counts"),
+    (lambda h: result_changed(h, covariance=((1.0,),)), "a covariance has another size"),
+    (lambda h: result_changed(h, covariance=((-1.0,) * 42,) * 42), "this is no covariance"),
+    (lambda h: h.append(events.Committed(approved_by="me")), "nothing that it follows from"),
+    (lambda h: h.append(h[0]), "the run was started before"),
+]
 
 
 async def refusal_of(site: Any) -> str:
@@ -140,15 +90,15 @@ async def refusal_of(site: Any) -> str:
     return str(refused.value)
 
 
-@pytest.mark.parametrize("forgery", FORGERIES)
-async def test_a_forged_journal_is_refused(finished, make_site, forgery: str) -> None:
+@pytest.mark.parametrize(("forge", "words"), FORGERIES, ids=[words for _, words in FORGERIES])
+async def test_a_forged_journal_is_refused(finished, make_site, forge: Forgery, words: str) -> None:
     site = make_site()
     site.write(finished.until(events.Identified), moved_from=finished)
     history: History = list(finished.until(events.Identified))
     history[0] = history[0].model_copy(update={"cell_text": site.cell.text})
-    forge, words = FORGERIES[forgery]
     forge(history)
-    rewritten(site, history)
+    site.folder.journal.unlink()
+    record(site.folder.journal, history)
     assert words in await refusal_of(site)
 
 
@@ -190,9 +140,7 @@ async def test_a_replay_opens_no_list_of_poses_that_the_journal_only_names(finis
     history: History = list(finished.history)
     text = history[0].cell_text.replace("[identification]\n", '[identification]\nposes = "/etc/passwd"\n')
     history[0] = history[0].model_copy(update={"cell_text": text})
-    with Journal(tmp_path / "journal.jsonl") as journal:
-        for event in history:
-            journal.append(event)
+    record(tmp_path / "journal.jsonl", history)
     with pytest.raises(FileError, match="names a list of poses, /etc/passwd, and does not have it"):
         await replay(tmp_path)
 
@@ -200,9 +148,7 @@ async def test_a_replay_opens_no_list_of_poses_that_the_journal_only_names(finis
 async def test_a_replay_of_a_forged_journal_is_refused_with_its_line(finished, tmp_path) -> None:
     history: History = list(finished.history)
     changed(history, events.Arrived, pose=(1e308,) * 6)
-    with Journal(tmp_path / "journal.jsonl") as journal:
-        for event in history:
-            journal.append(event)
+    record(tmp_path / "journal.jsonl", history)
     line = 1 + max(n for n, event in enumerate(history) if isinstance(event, events.Arrived))
     with pytest.raises(FileError, match=r"1e\+308 is not within") as refused:
         await replay(tmp_path)

@@ -10,10 +10,11 @@ from hexacell.services.history.past_runs import compare_runs, parameter_trends, 
 from hexacell.services.write_back.config_rollback import roll_back_config
 from hexacell.text.history import NO_DRIFT, NO_RUNS, comparison_text, drift_text, history_text, standing
 from hexacell.verdict.decision import Verdict
-from procedures.journal.journal import Journal, read_journal
+from procedures.journal.journal import read_journal
 from procedures.steps import events
 from tests.hexacell.results.test_run_comparison import covariance, result
 from tests.hexacell.services.proposed_runs import ProposedRun, propose_run
+from tests.recorded_events import record
 
 
 def identified(cell: Cell, name: str, shift_mm: float = 0.0) -> ProposedRun:
@@ -23,11 +24,8 @@ def identified(cell: Cell, name: str, shift_mm: float = 0.0) -> ProposedRun:
     values = np.full(42, 100.0)
     values[-6] += shift_mm
     run.folder.journal.unlink()
-    with Journal(run.folder.journal) as journal:
-        journal.append(history[0])
-        journal.append(events.Identified(result=result(values), held_out=()))
-        for event in history[1:]:
-            journal.append(event)
+    found = events.Identified(result=result(values), held_out=())
+    record(run.folder.journal, [history[0], found, *history[1:]])
     return run
 
 
@@ -57,9 +55,7 @@ def test_a_run_that_is_not_over_says_so(cell) -> None:
     run = propose_run(cell)
     history = read_journal(run.folder.journal)
     run.folder.journal.unlink()
-    with Journal(run.folder.journal) as journal:
-        for event in (*history[:-1], events.Interrupted(reason="a cable broke", exit_code=3)):
-            journal.append(event)
+    record(run.folder.journal, (*history[:-1], events.Interrupted(reason="a cable broke", exit_code=3)))
     (found,) = past_runs(cell)
     assert not found.summary.is_over
     assert (found.summary.line, standing(found)) == ("not over: a cable broke", "not over")

@@ -50,9 +50,7 @@ async def test_a_config_that_the_controller_does_not_run_is_found_before_the_fir
     site = make_site()
     site.simulated.faults.inject("old config", "controller")
     edit(site.cell)
-    with pytest.raises(
-        GuardTripped, match=r"it runs another geometry than this file.* read .*again"
-    ) as odd:
+    with pytest.raises(GuardTripped, match=r"runs another geometry than this file") as odd:
         await site.calibrate()
     assert str(site.cell.config_path) in str(odd.value)
     assert site.simulated.schedule.move_count == 0

@@ -22,9 +22,9 @@ from hexacell.runs.run_folder import RunFolder
 from hexacell.services.history.recorded_cell import commanding_geometries, noise_of_run
 from hexacell.services.offline import fit_measurements
 from hexacell.text.identification import identification_report
-from procedures.journal.journal import Journal
 from procedures.run.keys import Phase, SetKey
 from procedures.steps import events
+from tests.recorded_events import record
 
 ON_FLOOR = FrameTransform(
     base=Rotation.from_rotvec([-0.7, 0.0, 0.0]).as_matrix(),
@@ -50,9 +50,7 @@ def cell(tmp_path: Path, paper) -> Cell:
 
 
 def run_of(folder: Path, *history: events.Event) -> RunFolder:
-    with Journal(RunFolder(folder).journal) as journal:
-        for event in history:
-            journal.append(event)
+    record(RunFolder(folder).journal, history)
     return RunFolder(folder)
 
 

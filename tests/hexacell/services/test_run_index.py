@@ -9,12 +9,13 @@ import pytest
 from hexacell.cell.loader import Cell
 from hexacell.config.write_back import commit
 from hexacell.runs.archive import INDEX, Archive
-from hexacell.runs.run_folder import DocumentKind, RunFolder, StampedDocument, runs_folder
+from hexacell.runs.run_folder import DocumentKind, StampedDocument, runs_folder
 from hexacell.services.history.past_runs import past_runs
-from hexacell.services.history.run_index import PastRun, RunIndex
-from procedures.journal.journal import Entry, Journal, read_entries
+from hexacell.services.history.run_index import PastRun
+from procedures.journal.journal import Entry, read_entries
 from procedures.steps import events
 from tests.hexacell.services.proposed_runs import a_cell, propose_run
+from tests.recorded_events import record
 
 SUMMARY = DocumentKind.SUMMARY
 
@@ -50,8 +51,7 @@ def test_folders_are_read_once_and_again_when_they_change(cell, opened) -> None:
     opened.clear()
     assert past_runs(cell) == first
     assert opened == []
-    with Journal(RunFolder(runs_folder(cell) / "a").journal) as journal:
-        journal.append(events.Interrupted(reason="later", exit_code=3))
+    record(runs_folder(cell) / "a" / "journal.jsonl", [events.Interrupted(reason="later", exit_code=3)])
     past_runs(cell)
     assert opened == ["a"]
 
@@ -84,12 +84,3 @@ def test_a_damaged_index_is_made_anew(cell, opened) -> None:
     opened.clear()
     assert past_runs(cell) == first
     assert opened == []
-
-
-def test_without_an_archive_the_folders_are_read_with_a_warning(cell, tmp_path) -> None:
-    first = past_runs(cell)
-    warnings: list[str] = []
-    index = RunIndex(cell, f"postgresql://nobody@/none?host={tmp_path}", warnings.append)
-    assert past_runs(cell, index) == first
-    assert len(warnings) == 1
-    assert "read from their folders" in warnings[0]

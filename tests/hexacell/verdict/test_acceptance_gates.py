@@ -100,9 +100,7 @@ def test_the_change_is_from_the_controllers_geometry(judged, identified, paper):
     assert judged(largest_change_mm=change + 0.01)["small change"].passed
     gate = judged(largest_change_mm=5.0)["small change"]
     assert not gate.passed
-    assert gate.sentence == (
-        f"The largest change is {change:.2f} mm, the choice of frames apart (limit without a person 5 mm)."
-    )
+    assert f"largest change is {change:.2f} mm" in gate.sentence
     assert judged(largest_change_mm=1.0, before=identified.geometry)["small change"].passed
 
 

@@ -191,7 +191,5 @@ def test_the_outcome_says_what_was_used_the_error_and_the_verdict(cell, result, 
     _, found = result
     verified = verified_by(cell, result, held_out())
     line = outcome_line(IdentificationResult.of(found), 35, verified)
-    assert line.startswith(
-        "35 parameters, 55 records at 5 points; mean deviation at held-out poses 3.60 -> "
-    )
+    assert line.startswith("35 parameters, 55 records at 5 points; mean deviation at held-out poses 3.60")
     assert line.endswith(" mm (limit 0.3): pass")

@@ -1,6 +1,5 @@
 """A length check of a calibrated machine on fake devices, and what may go wrong between the seats."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
@@ -13,7 +12,6 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.devices import ThermometerSettings
 from hexacell.cell.loader import load_cell
 from hexacell.errors import AnswerNeeded, HexacellError
-from hexacell.kinematics.pose import Pose
 from hexacell.results.result import AcceptedResult
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.length_check import LengthStatement
@@ -34,7 +32,6 @@ from tests.procedures.runs.listening import happened
 
 RECORDS = 6
 MOUNTINGS = [SetKey(phase=Phase.LENGTH, point=number) for number in (1, 2, 3)]
-HERE = Pose(150.0, 0.0, 500.0)
 ACCEPTED = AcceptedResult(
     run="runs/before",
     at=datetime(2026, 11, 20, tzinfo=UTC),
@@ -66,21 +63,10 @@ async def stated(rig: Rig, *listeners: Any) -> LengthStatement:
     return found
 
 
-def recorder(told: list[Any]) -> Any:
-    def record(event: events.Event, _: RunState) -> None:
-        told.append(event)
-
-    return record
-
-
-def less(shown: Callable[[], float], off: float) -> float:
-    return shown() - off
-
-
 def zero_gauges(rig: Rig) -> None:
     """A person presses the zero keys."""
     for gauge in rig.gauges:
-        gauge.shown = partial(less, gauge.shown, gauge.shown())
+        gauge.shown = partial(lambda shown, off: shown() - off, gauge.shown, gauge.shown())
 
 
 async def test_true_encoders_pass_and_nothing_is_written(make_length_rig) -> None:
@@ -109,7 +95,7 @@ async def test_a_scale_of_all_encoders_is_found(make_length_rig, long_um_m: floa
 async def test_the_mountings_and_their_poses(make_length_rig) -> None:
     rig = make_length_rig()
     told: list[Any] = []
-    await rig.run(recorder(told))
+    await rig.run(lambda event, _: told.append(event))
     samples = [event for event in told if isinstance(event, events.RecordTaken)]
     assert [event.at for event in told if isinstance(event, events.SetClosed)] == MOUNTINGS
     assert [(s.at, s.orientation) for s in samples] == [
@@ -267,7 +253,7 @@ async def test_a_run_checks_the_scale_before_its_verdict(make_rig) -> None:
     }
     rig = make_rig(length_check=True, **changes)
     told: list[Any] = []
-    await rig.run(recorder(told))
+    await rig.run(lambda event, _: told.append(event))
     steps = [event.step for event in told if isinstance(event, events.StepBegun)]
     moves = [step.at.phase for step in steps if isinstance(step, Move)]
     assert moves.index(Phase.LENGTH) > max(n for n, phase in enumerate(moves) if phase is Phase.AFTER)

@@ -47,10 +47,7 @@ async def test_too_few_records_are_refused_before_they_are_measured(make_rig) ->
     two_points = ((0.0, 0.0, 550.0), (100.0, -100.0, 500.0))
     assert await failures(make_rig(identification__points=two_points, identification__orientations=7)) == []
     (found,) = await failures(make_rig(identification__points=two_points, identification__orientations=6))
-    assert found == (
-        "[identification]: 2 points with 6 orientations give 30 equations for 35 parameters. "
-        "Have at least 7 orientations at each point"
-    )
+    assert "2 points with 6 orientations give 30 equations for 35 parameters. Have at least 7 " in found
 
 
 async def test_gauges_carried_by_hand_need_a_person(make_rig) -> None:

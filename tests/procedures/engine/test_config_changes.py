@@ -135,9 +135,7 @@ async def test_an_edit_is_noticed_before_the_next_move_and_the_file_and_line_are
     rig = make_rig()
     with pytest.raises(FileError, match="Undo the edit and retry") as noticed:
         await rig.run(edits(rig, events.RecordTaken, 3))
-    assert str(noticed.value).startswith(
-        f"{rig.cell.config_path}:7: the config changed since the run began"
-    )
+    assert str(noticed.value).startswith(f"{rig.cell.config_path}:7: the config changed since")
     assert noticed.value.exit_code is ExitCode.USAGE
     taken = happened(rig, events.RecordTaken)
     assert len(taken) == 3

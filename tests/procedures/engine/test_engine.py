@@ -2,6 +2,7 @@
 
 import asyncio
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -10,7 +11,6 @@ from hexacell.errors import (
     DeviceError,
     ExitCode,
     FileError,
-    HexacellError,
     Interruption,
     LimitError,
     SeveralErrors,
@@ -146,10 +146,7 @@ async def test_repeated_cancellation_does_not_prevent_the_stop(script, journal, 
 
 
 async def test_an_error_while_deciding_stops_motion_too(script, journal, bench) -> None:
-    def undecided(_: RunState) -> Step | None:
-        raise LimitError("the gauges cannot be zeroed")
-
-    script.next_step = undecided
+    script.next_step = Mock(side_effect=LimitError("the gauges cannot be zeroed"))
     with pytest.raises(LimitError):
         await Engine(script, journal).run()
     assert bench.controller.log == ["prepare", "stop"]
@@ -168,9 +165,7 @@ async def test_a_controller_that_cannot_be_prepared_ends_the_run_at_once(script,
 @pytest.mark.parametrize(
     "error", [DeviceError("does not answer", subject="gauge x"), Interruption("aborted")]
 )
-async def test_if_stopping_fails_too_that_is_said_first(
-    script, journal, bench, error: HexacellError
-) -> None:
+async def test_if_stopping_fails_too_that_is_said_first(script, journal, bench, error) -> None:
     script.failure = error
     bench.controller.failures["stop"] = DeviceError("connection lost", subject="controller")
     with pytest.raises(RobotNotStopped) as failure:

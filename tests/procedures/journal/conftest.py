@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from hexacell.verdict.acceptance_gates import AcceptanceGate
-from procedures.journal.journal import Journal
 from procedures.steps import events
+from tests.recorded_events import record
 
 
 @pytest.fixture
@@ -32,9 +32,7 @@ TOLD: tuple[Any, ...] = (
 
 
 def write_told(path: Path) -> bytes:
-    with Journal(path) as journal:
-        for event in TOLD:
-            journal.append(event)
+    record(path, TOLD)
     return path.read_bytes()
 
 

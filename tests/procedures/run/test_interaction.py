@@ -37,10 +37,7 @@ GOOD = AcceptanceGate(name="converged", passed=True, sentence="The solver ended.
     ("question", "words"),
     [
         (placement_at(3), r"point 3 \(X1\.000 .*fixed stations"),
-        (
-            ask_approval(PendingChange((LARGE, GOOD), "diff"), cell="bench"),
-            r"approval: The largest change is 9 mm\.$",
-        ),
+        (ask_approval(PendingChange((LARGE, GOOD), "diff"), cell="bench"), r"largest change is 9 mm\.$"),
         (ask_approval(PendingChange((), "diff"), cell="bench"), "the cell file says to ask"),
         (ask_recovery("It broke.", (Action.RETRY, Action.ABORT)), r"^It broke\. A .*: retry, abort"),
     ],

@@ -9,7 +9,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.cell.devices import ThermometerSettings
-from procedures.journal.journal import Journal, read_journal
+from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase, SetKey
 from procedures.run.readings import Reading, Temperature, mean_leg_temperatures, mean_temperature, on_parts
 from procedures.run.state import RunState, apply, fold
@@ -21,6 +21,7 @@ from procedures.steps.pilot import Pilot
 from procedures.steps.roll_back import RollBack
 from procedures.steps.sample import Sample
 from tests.procedures.story import READING, an_identification, located
+from tests.recorded_events import record
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 
@@ -263,9 +264,7 @@ def test_steps_survive_json(step: Any) -> None:
 @given(history=st.lists(st.one_of([drawn(kind) for kind in EVENTS]), max_size=4))
 def test_events_survive_the_journal(history: list[events.Event], tmp_path_factory: Any) -> None:
     path = tmp_path_factory.mktemp("journal") / "journal.jsonl"
-    with Journal(path) as journal:
-        for event in history:
-            journal.append(event)
+    record(path, history)
     assert repr(read_journal(path)) == repr(tuple(history))
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -86,12 +87,8 @@ async def test_a_gauge_that_was_connected_again_is_tried_again(make_rig) -> None
 
 async def test_after_an_interruption_the_gauges_are_tried_again_before_the_set_continues(make_rig):
     rig = make_rig(stations__trial_mm=1.0)
-
-    def stop() -> None:
-        raise LimitError("stop here")
-
     with pytest.raises(LimitError, match="stop here"):
-        await rig.run(at_step("P1/o04/sample", stop))
+        await rig.run(at_step("P1/o04/sample", Mock(side_effect=LimitError("stop here"))))
     await run_until(rig, events.SetClosed)
     history = read_journal(rig.folder.journal)
     confirmed = next(n for n, event in enumerate(history) if isinstance(event, events.ReferenceConfirmed))

@@ -252,9 +252,7 @@ async def test_a_device_that_fails_meanwhile_costs_no_more_than_its_recovery(ask
 
 
 @pytest.mark.parametrize("revisits", [0, 1])
-async def test_a_run_that_visits_its_reference_hardly_ends_with_a_verdict(
-    make_rig: MakeRig, revisits: int
-) -> None:
+async def test_a_run_that_visits_its_reference_hardly_ends_with_a_verdict(make_rig, revisits) -> None:
     """Readings at rest alone are no repeats."""
     rig = make_rig(noise__standstill_readings=16, noise__revisits=revisits)
     await rig.run()

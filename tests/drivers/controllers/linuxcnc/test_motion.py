@@ -97,12 +97,8 @@ async def test_a_refused_move_reports_and_clears_all_error_messages(play):
         "get error: invalid params in linear command | get error: OK"
     )
     driver = await play.opened([*REFUSED, *errors, *MOVED, RESTORED])
-    with pytest.raises(MoveRefused) as caught:
+    with pytest.raises(MoveRefused, match="fails kinematicsInverse; invalid params in linear command"):
         await driver.move(TARGET, MOVE_S)
-    assert caught.value.problem == (
-        "refuses to move to X10.000 Y20.000 Z560.000 A5.000 B-4.000 C3.000: "
-        "Linear move on line 0 fails kinematicsInverse; invalid params in linear command"
-    )
     await driver.move(TARGET, MOVE_S)
 
 
@@ -141,9 +137,7 @@ async def test_a_connection_lost_during_a_move_stops_the_machine(play):
 
 async def test_a_controller_lost_during_a_move_makes_the_error_ask_for_the_emergency_stop(play):
     driver = await play.opened([(MDI, play.HANG_UP)], *[[("hello EMC hexacell 1.0", play.HANG_UP)]] * 3)
-    with pytest.raises(
-        DeviceError, match=r"could not be stopped: it closed the connection: .*\. Press the emer"
-    ):
+    with pytest.raises(DeviceError, match=r"could not be stopped: it closed .*\. Press the emer"):
         await driver.move(TARGET, MOVE_S)
 
 

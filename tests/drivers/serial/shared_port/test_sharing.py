@@ -3,6 +3,7 @@
 import errno
 import os
 import termios
+from unittest.mock import Mock
 
 import pytest
 import serial
@@ -140,11 +141,7 @@ async def test_a_terminal_marks_bytes_of_wrong_parity_and_opens_again():
 
 async def test_a_pseudo_terminal_that_refuses_parity_is_reported(fake):
     port = fake(FakePort())
-
-    def refuse():
-        raise termios.error(errno.EINVAL, "Invalid argument")
-
-    port.open = refuse
+    port.open = Mock(side_effect=termios.error(errno.EINVAL, "Invalid argument"))
     link = link_to("fake", {"bytesize": 7, "parity": "E", "stopbits": 2})
     with pytest.raises(DeviceError, match="cannot be opened"):
         await link.open()

@@ -76,9 +76,7 @@ def test_what_was_known_under_another_geometry_does_not_count(hexaglide, assumpt
 
 def test_one_point_is_refused_however_many_records_it_has(visit, make_problem):
     exact = visit(points=1, orientations=40, seed=0)
-    with pytest.raises(
-        IdentifiabilityError, match=r"one point.* 35 parameters.*two points at least"
-    ) as caught:
+    with pytest.raises(IdentifiabilityError, match=r"one point.* 35 parameters.*two points") as caught:
         identify(make_problem(exact.measured()))
     assert caught.value.exit_code is ExitCode.OUT_OF_LIMITS
 
@@ -95,11 +93,8 @@ def test_too_few_records_are_refused_with_the_number_missing(
     visit, make_problem, points, orientations, equations, missing
 ):
     exact = visit(points=points, orientations=orientations, seed=1)
-    with pytest.raises(
-        IdentifiabilityError,
-        match=f"{points * orientations} records at {points} points give {equations} equations for 35 "
-        f"parameters.* {missing} more records",
-    ):
+    words = f"{points * orientations} records at {points} points give {equations} .* {missing} more records"
+    with pytest.raises(IdentifiabilityError, match=words):
         identify(make_problem(exact.measured()))
 
 
@@ -124,9 +119,7 @@ def test_joints_of_other_poses_are_refused_and_the_first_record_named(visit, mak
     """For instance with the sign of the encoders reversed."""
     measured = visit(seed=2).measured()
     reversed_encoders = altered(measured, lambda r: {"joints": np.negative(r.joints)})
-    with pytest.raises(
-        IdentifiabilityError, match=r"\d+ of 55 records .* the first is point 1, orientation 1"
-    ):
+    with pytest.raises(IdentifiabilityError, match=r"\d+ of 55 records .* first is point 1, orientation 1"):
         make_problem(reversed_encoders)
 
 

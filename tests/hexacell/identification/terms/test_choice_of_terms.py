@@ -67,9 +67,7 @@ def test_backlash_is_not_needed_where_all_stops_were_reached_from_one_side() -> 
     one_sided = [replace(one, directions=(1,) * 6) for one in measured("play").records]
     backlash, play, _ = term_results(identify(robot().problem(MeasurementSet(tuple(one_sided)))))
     assert (backlash.finding, backlash.predicted, play.is_taken) == (Finding.ONE_SIDE, None, True)
-    assert "backlash is not needed: it is the same at every stop" in " ".join(
-        terms_text([backlash]).split()
-    )
+    assert "backlash is not needed: it is the same" in " ".join(terms_text([backlash]).split())
 
 
 def largest_mm(geometry: Geometry, left: Mapping[str, Array]) -> float:

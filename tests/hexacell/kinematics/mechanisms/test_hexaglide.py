@@ -59,9 +59,7 @@ def test_a_pose_out_of_reach_names_the_leg_and_the_pose(hexaglide, paper):
     lengths[3] = 400.0
     short_leg_4 = hexaglide_geometry(paper.nominal["S"], paper.nominal["B"], lengths)
     poses = PoseBatch.of([Pose(0, 0, 500), Pose(0, 0, 550), Pose(0, 0, 560, 1)])
-    with pytest.raises(
-        ReachError, match=r"^leg 4 cannot reach the pose X0\.000 Y0\.000 Z550\.000 "
-    ) as caught:
+    with pytest.raises(ReachError, match=r"^leg 4 cannot .* X0\.000 Y0\.000 Z550\.000 ") as caught:
         inverse_kinematics(hexaglide, short_leg_4, paper.branch, poses)
     assert caught.value.exit_code is ExitCode.USAGE
 

@@ -133,9 +133,7 @@ def machines() -> list[Machine]:
 
 @pytest.mark.parametrize("machine", machines(), ids=lambda machine: machine.mechanism.name)
 @given(poses, st.floats(-5.0, 5.0))
-def test_constraints_and_derivatives_are_those_of_the_leg_equation(
-    machine: Machine, pose: Pose, off: float
-) -> None:
+def test_constraints_and_derivatives_are_those_of_the_leg_equation(machine, pose, off) -> None:
     """Also where the legs do not close: the solver linearises there."""
     mechanism, batch = machine.mechanism, PoseBatch.of([pose])
     batch = PoseBatch(batch.positions + np.array([0.0, 0.0, machine.middle]), batch.rotations)

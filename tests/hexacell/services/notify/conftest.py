@@ -4,10 +4,6 @@ import pytest
 
 
 @pytest.fixture(autouse=True)
-def no_proxy(monkeypatch):
+def reached_at_once(monkeypatch):
     monkeypatch.setenv("no_proxy", "127.0.0.1")
-
-
-@pytest.fixture(autouse=True)
-def no_pauses(monkeypatch):
     monkeypatch.setattr("hexacell.services.unattended.delivery.PAUSES_S", (0.0, 0.0))

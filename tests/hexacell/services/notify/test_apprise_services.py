@@ -45,16 +45,12 @@ def test_a_refusal_shows_no_password() -> None:
     assert server.headers[0]["Authorization"].startswith("Basic ")
 
 
-def test_where_nobody_listens_no_secret_is_told() -> None:
-    url = f"json://127.0.0.1:{closed_port()}/hidden-token"
-    with pytest.raises(NoticeUndelivered) as raised:
-        deliver(an_address(url, open_url=None), NOTICE)
-    assert "hidden" not in str(raised.value)
-
-
-def test_an_address_that_apprise_does_not_know() -> None:
-    with pytest.raises(NoticeUndelivered, match="does not know") as raised:
-        deliver(an_address("pigeon://hidden-token", open_url=None), NOTICE)
+@pytest.mark.parametrize(
+    ("url", "why"), [("json://127.0.0.1:{port}/hidden-x", None), ("pigeon://hidden-token", "does not know")]
+)
+def test_where_nobody_is_reached_no_secret_is_told(url: str, why: str | None) -> None:
+    with pytest.raises(NoticeUndelivered, match=why) as raised:
+        deliver(an_address(url.format(port=closed_port()), open_url=None), NOTICE)
     assert "hidden" not in str(raised.value)
 
 

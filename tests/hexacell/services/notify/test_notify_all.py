@@ -7,6 +7,7 @@ from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -97,12 +98,8 @@ def test_after_a_power_cut_between_telling_and_forgetting_it_is_told_again_with_
     tmp_path, post, monkeypatch
 ) -> None:
     cell = told_cell(tmp_path)
-
-    def cut(*_: object) -> None:
-        raise FileError("no power")
-
     with monkeypatch.context() as patch:
-        patch.setattr(NoticeOutbox, "forget", cut)
+        patch.setattr(NoticeOutbox, "forget", Mock(side_effect=FileError("no power")))
         notify_all(cell, now_notice(1), post)
     assert send_waiting(cell, post).are_all_sent
     assert sorted(post.taken) == [("one", "1")] * 2 + [("two", "1")] * 2
@@ -136,12 +133,9 @@ def test_on_a_full_disk_it_is_told_all_the_same(tmp_path, post, monkeypatch) -> 
     def full(path: Path, *_: Any, **__: Any) -> None:
         raise FileError("the disk is full", subject=path)
 
-    def read_only(path: Path, *_: Any, **__: Any) -> None:
-        raise OSError(errno.EROFS, os.strerror(errno.EROFS), path)
-
     with monkeypatch.context() as patch:
         patch.setattr("hexacell.storage.atomic_files.write_atomically", full)
-        patch.setattr(Path, "unlink", read_only)
+        patch.setattr(Path, "unlink", Mock(side_effect=OSError(errno.EROFS, os.strerror(errno.EROFS))))
         assert notify_all(cell, now_notice(1), post).are_all_sent
         post.absent = {"one"}
         (told, untold) = sorted(notify_all(cell, now_notice(2), post).deliveries, key=lambda one: -one.sent)

@@ -6,6 +6,7 @@ import resource
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -67,13 +68,8 @@ def test_a_write_that_the_kernel_cuts_short_leaves_nothing(path: Path, tmp_path:
     ],
 )
 @pytest.mark.parametrize("name", ["replace", "chmod"])
-def test_failures_are_reported_in_plain_words(
-    path: Path, monkeypatch: pytest.MonkeyPatch, name: str, code: int, words: str
-) -> None:
-    def fail(*_: object, **_named: object) -> None:
-        raise OSError(code, os.strerror(code))
-
-    monkeypatch.setattr(os, name, fail)
+def test_failures_are_reported_in_plain_words(path, monkeypatch, name, code, words) -> None:
+    monkeypatch.setattr(os, name, Mock(side_effect=OSError(code, os.strerror(code))))
     with pytest.raises(FileError, match="is unchanged") as caught:
         atomic_files.write_atomically(path, b"new")
     assert words in str(caught.value)
@@ -93,13 +89,8 @@ def test_a_folder_that_cannot_be_synced_is_reported(path: Path, monkeypatch: pyt
 
 
 @pytest.mark.parametrize(("code", "fails"), [(errno.EINVAL, False), (errno.EIO, True)])
-def test_file_systems_that_cannot_sync_folders_are_accepted(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int, fails: bool
-) -> None:
-    def fsync(_: int) -> None:
-        raise OSError(code, "x")
-
-    monkeypatch.setattr(os, "fsync", fsync)
+def test_file_systems_that_cannot_sync_folders_are_accepted(tmp_path, monkeypatch, code, fails) -> None:
+    monkeypatch.setattr(os, "fsync", Mock(side_effect=OSError(code, "x")))
     if fails:
         with pytest.raises(OSError, match="x"):
             atomic_files.sync_folder(tmp_path)
@@ -107,13 +98,8 @@ def test_file_systems_that_cannot_sync_folders_are_accepted(
         atomic_files.sync_folder(tmp_path)
 
 
-def test_an_interrupt_leaves_no_temporary_file(
-    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(os, "replace", interrupt)
+def test_an_interrupt_leaves_no_temporary_file(path, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(os, "replace", Mock(side_effect=KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
         atomic_files.write_atomically(path, b"new")
     assert names(tmp_path) == [path.name]
@@ -136,12 +122,9 @@ def died(monkeypatch: pytest.MonkeyPatch) -> Callable[[Path], None]:
     class Death(BaseException):
         pass
 
-    def die(_: object, __: object) -> None:
-        raise Death
-
     def write(path: Path) -> None:
         with monkeypatch.context() as patch:
-            patch.setattr(os, "replace", die)
+            patch.setattr(os, "replace", Mock(side_effect=Death))
             patch.setattr(Path, "unlink", lambda *_, **__: None)
             with pytest.raises(Death):
                 atomic_files.write_atomically(path, b"half a thought")
@@ -214,9 +197,7 @@ def test_folders_are_made_with_those_above(tmp_path: Path) -> None:
             atomic_files.create_folder_durably(tmp_path / name)
 
 
-def test_the_name_of_every_new_folder_is_synced_in_its_parent(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_name_of_every_new_folder_is_synced_in_its_parent(tmp_path, monkeypatch) -> None:
     synced: list[Path] = []
     monkeypatch.setattr(atomic_files, "sync_folder", synced.append)
     atomic_files.create_folder_durably(tmp_path / "runs" / "cell" / "run")

@@ -77,9 +77,7 @@ def test_extended_attributes_stay(path: Path) -> None:
     assert os.getxattr(path, "user.remark") == b"mine"
 
 
-def test_a_file_system_without_extended_attributes_is_no_failure(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_system_without_extended_attributes_is_no_failure(path, monkeypatch) -> None:
     def unsupported(_: Path, **_named: bool) -> list[str]:
         raise OSError(errno.ENOTSUP, "not supported")
 
@@ -147,9 +145,7 @@ def test_the_order_is_data_then_name_then_folder(path: Path, monkeypatch: pytest
     assert order == ["data 5", "name", "folder"]
 
 
-def test_no_other_user_can_read_a_private_file_while_it_is_written(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_other_user_can_read_a_private_file_while_it_is_written(path, monkeypatch) -> None:
     seen, copystat = [], shutil.copystat
 
     def look(source: Path, target: Path) -> None:

@@ -7,6 +7,9 @@ time-out that pytest has for each test ends the wait and shows what waited.
 import asyncio
 import time
 from collections.abc import Callable
+from typing import Any
+
+import pytest
 
 PAUSE_S = 0.002
 
@@ -21,3 +24,10 @@ async def until(condition: Callable[[], bool]) -> None:
     """The same on the event loop: other tasks go on meanwhile."""
     while not condition():  # noqa: ASYNC110 - threads and processes set no asyncio.Event
         await asyncio.sleep(PAUSE_S)
+
+
+async def cancel(task: asyncio.Future[Any]) -> None:
+    """Cancel it; it ends with the cancellation."""
+    task.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await task

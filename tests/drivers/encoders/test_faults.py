@@ -155,22 +155,18 @@ def heartbeats(raw, monkeypatch):
     return beating
 
 
-@pytest.fixture
-async def heartbeat_bank(make_bank):
-    return make_bank(heartbeat_ms=20)
-
-
-async def test_heartbeats_are_requested_and_their_loss_is_an_error(raw, heartbeat_bank, heartbeats):
-    await heartbeat_bank.open()
+async def test_heartbeats_are_requested_and_their_loss_is_an_error(raw, make_bank, heartbeats):
+    bank = make_bank(heartbeat_ms=20)
+    await bank.open()
     assert raw.nodes[1].objects[0x1017, 0] == b"\x14\x00"
-    await heartbeats.advance(heartbeat_bank, 0.4)
-    await heartbeat_bank.read()
+    await heartbeats.advance(bank, 0.4)
+    await bank.read()
     heartbeats.beating.discard(5)
-    await heartbeats.advance(heartbeat_bank, 0.24)
-    await heartbeat_bank.read()
-    await heartbeats.advance(heartbeat_bank, 0.04)
+    await heartbeats.advance(bank, 0.24)
+    await bank.read()
+    await heartbeats.advance(bank, 0.04)
     with pytest.raises(SilentNodeError, match=r"encoder of leg 5 \(node 5\): no heartbeat for 0.26 s"):
-        await heartbeat_bank.read()
+        await bank.read()
 
 
 async def test_without_heartbeats_silence_is_no_fault(bank, heartbeats):

@@ -10,7 +10,7 @@ import pytest
 from drivers.errors import BusError
 from hexacell.errors import DeviceError
 from tests.drivers.encoders.conftest import short_timeout
-from tests.waiting import until
+from tests.waiting import cancel, until
 
 
 async def test_a_cancelled_read_returns_soon_and_the_next_one_is_right(raw, make_bank):
@@ -28,9 +28,7 @@ async def test_a_cancelled_read_returns_soon_and_the_next_one_is_right(raw, make
     raw.nodes[1].answers_sync = hold
     reading = asyncio.ensure_future(bank.read())
     await until(held.is_set)
-    reading.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await reading
+    await cancel(reading)
     raw.nodes[1].answers_sync = lambda sync: [b"\x02\0\0\0"]
     release.set()
     assert (await bank.read()).counts == (2, 2000, 3000, 4000, 5000, 6000)

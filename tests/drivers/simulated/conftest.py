@@ -68,6 +68,11 @@ class Twin:
     truth: Geometry
     commanding: Geometry
 
+    def go(self, pose: Pose) -> None:
+        """Moves there, and waits until the end."""
+        self.machine.move(pose)
+        self.clock.time_s += 10.0
+
     def joints_for(self, pose: Pose) -> Array:
         """The slider positions of a pose by the controller's geometry."""
         branch = native_layout(HEXAGLIDE_PARAMETERS).read(self.config).branch

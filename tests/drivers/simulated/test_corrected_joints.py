@@ -51,8 +51,7 @@ def off(twin: Any, poses: tuple[Pose, ...] = POSES) -> list[float]:
     """How far the ball is from where it was commanded, mm, at each pose."""
     found = []
     for pose in poses:
-        twin.machine.move(pose)
-        twin.clock.time_s += 10.0
+        twin.go(pose)
         found.append(float(np.linalg.norm(ball(twin) - pose.position)))
         assert twin.machine.pose().as_tuple() == pytest.approx(pose.as_tuple(), abs=1e-9)
         config, poses_of = NATIVE.read(twin.config), PoseBatch.of([pose])
@@ -92,21 +91,18 @@ def test_a_joint_is_sent_half_of_its_backlash_further_in_the_direction_of_its_mo
     correct(twin, LAGGING)
     before = twin.machine.pose()
     for pose in POSES:
-        twin.machine.move(pose)
-        twin.clock.time_s += 10.0
+        twin.go(pose)
         sent, reported = twin.physics.encoder_positions(), np.array(twin.machine.joints())
         assert sent - reported == pytest.approx(half * directions(twin, before, pose, 1.0), abs=1e-9)
         before = pose
-    twin.machine.move(POSES[-1])
-    twin.clock.time_s += 10.0
+    twin.go(POSES[-1])
     assert twin.physics.encoder_positions() == pytest.approx(sent, abs=1e-6), "standing, it keeps its side"
 
 
 def test_stopped_in_a_move_a_joint_has_the_direction_of_that_move(make_twin) -> None:
     twin, half = make_twin(), 0.5 * np.array(LAGGING.backlash)
     correct(twin, LAGGING)
-    twin.machine.move(POSES[0])
-    twin.clock.time_s += 10.0
+    twin.go(POSES[0])
 
     def stop_half_way() -> None:
         twin.clock.time_s += 0.5 * twin.physics._motion.duration_s
@@ -121,14 +117,12 @@ def test_stopped_in_a_move_a_joint_has_the_direction_of_that_move(make_twin) -> 
 def test_corrections_that_are_read_move_nothing_until_the_next_motion(make_twin) -> None:
     twin = make_twin()
     correct(twin, LAGGING)
-    twin.machine.move(POSES[0])
-    twin.clock.time_s += 10.0
+    twin.go(POSES[0])
     sent, reported = twin.physics.encoder_positions(), twin.machine.joints()
     correct(twin, replace(YIELDING, backlash=LAGGING.backlash))
     assert np.array_equal(twin.physics.encoder_positions(), sent)
     assert twin.machine.joints() == pytest.approx(reported, abs=1e-6)
-    twin.machine.move(POSES[0])
-    twin.clock.time_s += 10.0
+    twin.go(POSES[0])
     branch = NATIVE.read(twin.config).branch
     controller = ControllerGeometry(twin.truth, branch, corrections=YIELDING)
     legs = with_longer_legs(Hexaglide(), controller, PoseBatch.of([POSES[0]]), np.array([reported]))[0]
@@ -146,13 +140,9 @@ def test_corrections_of_zero_change_no_bit(make_twin) -> None:
         twin.machine.switch_on()
         found = []
         for pose in POSES:
-            twin.machine.move(pose)
-            twin.clock.time_s += 10.0
-            found += [
-                *twin.physics.encoder_positions(),
-                *twin.machine.joints(),
-                *twin.machine.pose().as_tuple(),
-            ]
+            twin.go(pose)
+            found += [*twin.physics.encoder_positions(), *twin.machine.joints()]
+            found += twin.machine.pose().as_tuple()
         return found
 
     assert places("") == places("\n[corrections]\nweight_n = 100.0\n")

@@ -22,11 +22,6 @@ POSES = [
 ]
 
 
-def go(twin: Any, pose: Pose) -> None:
-    twin.machine.move(pose)
-    twin.clock.time_s += 10.0
-
-
 def there_and_back(twin: Any, start: Any) -> None:
     for path in ([start, start + 1.0], [start + 1.0, start]):
         twin.physics.start_motion(np.stack(path))
@@ -37,7 +32,7 @@ def test_the_ball_is_where_the_true_geometry_puts_it(make_twin) -> None:
     twin = make_twin(station_reach_mm=1e6)
     reference, seen = twin.ball_at(Pose(0.0, 0.0, 550.0)), twin.seen()
     for pose in POSES:
-        go(twin, pose)
+        twin.go(pose)
         assert twin.seen() - seen == pytest.approx(twin.ball_at(pose) - reference, abs=1e-6)
 
 

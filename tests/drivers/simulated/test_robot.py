@@ -122,16 +122,14 @@ def test_switching_on_reads_the_geometry_and_moves_no_slider(twin) -> None:
 def test_a_person_mounts_the_gauges_anew_where_another_geometry_brings_the_ball(twin) -> None:
     """However near that is: with the gauges of before, the plungers would be at an end of their travel."""
     near = Pose(6.0, 6.0, 550.0)
-    twin.machine.move(Pose(0.0, 0.0, 550.0))
-    twin.clock.time_s += 10.0
+    twin.go(Pose(0.0, 0.0, 550.0))
     twin.physics.gauge_displacement("x")
     same = native_layout(HEXAGLIDE_PARAMETERS).read(twin.config).geometry
     for geometry, is_mounted in ((same, False), (twin.truth, True)):
         station = twin.physics.gauges.station
         rewrite(twin, geometry)
         twin.machine.switch_on()
-        twin.machine.move(near)
-        twin.clock.time_s += 10.0
+        twin.go(near)
         twin.physics.gauge_displacement("x")
         assert np.array_equal(twin.physics.gauges.station, station) != is_mounted
 

@@ -17,7 +17,7 @@ from procedures.journal.journal import read_journal
 from procedures.run.readings import Temperature
 from procedures.steps import events
 from tests.procedures.fakes import FakeThermometer
-from tests.waiting import until
+from tests.waiting import cancel, until
 
 
 async def test_all_devices_that_cannot_be_opened_are_named_at_once(bench) -> None:
@@ -80,9 +80,7 @@ async def test_cancelling_cancels_every_call() -> None:
 
     task = asyncio.create_task(gather_errors("no", [forever(1), forever(2)]))
     await until(lambda: len(begun) == 2)
-    task.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await task
+    await cancel(task)
     assert cancelled == [1, 2]
 
 

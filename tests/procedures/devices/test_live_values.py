@@ -9,7 +9,7 @@ from drivers.interfaces import ControllerStatus, GaugeReading
 from hexacell.errors import DeviceError
 from procedures.devices.device_set import Devices, LiveValues, poll_for_screens
 from procedures.guards.guards import Guards
-from tests.waiting import until
+from tests.waiting import cancel, until
 
 
 @pytest.fixture
@@ -84,9 +84,7 @@ async def test_a_slow_subscriber_gets_the_latest_and_no_older_ones(live, devices
     assert not live._subscribers
 
 
-async def test_every_device_is_read_again_and_again_whatever_fails(bench) -> None:
-    live = LiveValues(bench.clock.now)
-    devices = replace(bench.devices, live=live)
+async def test_every_device_is_read_again_and_again_whatever_fails(live, devices, bench) -> None:
     bench.encoders.failure = DeviceError("is silent", subject="encoders")
     polling = asyncio.ensure_future(poll_for_screens(devices, period_s=0.0))
     await until(lambda: live.gauge("z").value is not None and live.encoders.problem != "")
@@ -96,14 +94,10 @@ async def test_every_device_is_read_again_and_again_whatever_fails(bench) -> Non
     await until(lambda: live.gauge("z").value == GaugeReading(1.5, "+1.500"))
     bench.clock.time_s += 10.0
     bench.encoders.failure = None
-    polling.cancel()
-    await asyncio.wait([polling])
-    assert polling.cancelled()
+    await cancel(polling)
 
 
-async def test_what_somebody_else_reads_is_left_alone(bench) -> None:
-    live = LiveValues(bench.clock.now)
-    devices = replace(bench.devices, live=live)
+async def test_what_somebody_else_reads_is_left_alone(live, devices, bench) -> None:
     reads = 0
 
     def shown() -> float:
@@ -120,5 +114,4 @@ async def test_what_somebody_else_reads_is_left_alone(bench) -> None:
     assert reads == 1, "its value is as young as it was: the clock stands"
     bench.clock.time_s += 1.0
     await until(lambda: reads > 1)
-    polling.cancel()
-    await asyncio.wait([polling])
+    await cancel(polling)

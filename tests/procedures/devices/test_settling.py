@@ -64,7 +64,6 @@ async def test_settling_waits_until_oscillation_decays(bench, axis: int) -> None
 
 
 async def test_readings_before_a_jump_are_not_in_the_settled_window(bench) -> None:
-    """Readings from before a jump are no part of the window that counts."""
     bench.gauges[0].shown = lambda: 0.0 if bench.clock.now() < 0.45 else 1.0
     settled = await settle(bench.devices, TIMING, bench.clock)
     assert set(settled.gauges[:, 0]) == {1.0}

@@ -26,6 +26,7 @@ from procedures.steps import events
 from procedures.steps.events import Step
 from procedures.steps.move import Move
 from tests.procedures.rig import failure_without_record
+from tests.waiting import cancel
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 POSE = (1.0, 2.0, 3.0, 0.0, 0.0, 0.0)
@@ -138,9 +139,7 @@ async def test_repeated_cancellation_does_not_prevent_the_stop(script, journal, 
     bench.controller.stop = slow_stop
     task = asyncio.create_task(Engine(script, journal).run())
     await script.blocked.wait()
-    task.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await task
+    await cancel(task)
     assert stopped == [True]
     assert journal.events[-1] == events.Interrupted(reason="CancelledError", exit_code=130)
 

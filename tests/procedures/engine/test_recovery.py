@@ -56,11 +56,16 @@ from tests.procedures.runs.listening import (
 from tests.waiting import until
 
 
+@pytest.fixture
+def rig(recording, replayed) -> Any:
+    """One point measured; the second one gets four records only, which is enough to go wrong in."""
+    return replayed(recording.until(events.SetClosed, count=1), identification__orientations=4)
+
+
 @pytest.mark.parametrize(("times", "reopened", "voided"), [(1, 0, 0), (3, 2, 2)])
 async def test_an_unattended_run_retries_a_silent_gauge_and_then_redoes_its_set(
-    at_second_point, times: int, reopened: int, voided: int
+    rig, times: int, reopened: int, voided: int
 ) -> None:
-    rig = at_second_point
     silent = failing(KEY, lambda: rig.gauges[1].failures.append(SILENT), times)
     assert await until_closed(rig, silent, policy=UNATTENDED)
     assert [event.attempt for event in happened(rig, events.Failed)] == list(range(1, times + 1))
@@ -69,8 +74,7 @@ async def test_an_unattended_run_retries_a_silent_gauge_and_then_redoes_its_set(
     assert rig.gauges[0].closed == 0, "the others are left alone"
 
 
-async def test_an_unattended_run_ends_after_a_bounded_number_of_attempts(at_second_point) -> None:
-    rig = at_second_point
+async def test_an_unattended_run_ends_after_a_bounded_number_of_attempts(rig) -> None:
     silent = failing(KEY, lambda: rig.gauges[1].failures.append(SILENT), 100)
     with pytest.raises(GaugeSilent):
         await rig.run(silent, policy=UNATTENDED)
@@ -100,8 +104,7 @@ def jumped_while_away(rig: Any, jump_mm: float) -> Any:
     return failing(KEY, unplug)
 
 
-async def test_after_a_lost_encoder_bus_the_reference_is_confirmed_again(at_second_point) -> None:
-    rig = at_second_point
+async def test_after_a_lost_encoder_bus_the_reference_is_confirmed_again(rig) -> None:
     assert await until_closed(rig, jumped_while_away(rig, 0.0), policy=UNATTENDED)
     (failure,) = happened(rig, events.Failed)
     assert (failure.failure, failure.action) == (FailureKind.LINK_LOST, Action.MEASURE_AGAIN)
@@ -109,15 +112,13 @@ async def test_after_a_lost_encoder_bus_the_reference_is_confirmed_again(at_seco
     assert not happened(rig, events.SetInvalidated)
 
 
-async def test_an_encoder_that_jumped_while_it_was_away_is_named(at_second_point) -> None:
-    rig = at_second_point
+async def test_an_encoder_that_jumped_while_it_was_away_is_named(rig) -> None:
     with pytest.raises(HexacellError, match=r"encoder 3: shows slider 3 at .* See whether it slipped"):
         await rig.run(jumped_while_away(rig, 3.0), policy=UNATTENDED)
     assert "P2" not in [str(event.at) for event in happened(rig, events.ReferenceConfirmed)]
 
 
-async def test_a_small_jump_while_it_was_away_costs_the_set(at_second_point) -> None:
-    rig = at_second_point
+async def test_a_small_jump_while_it_was_away_costs_the_set(rig) -> None:
     assert await until_closed(rig, jumped_while_away(rig, 0.2), policy=UNATTENDED)
     (invalidated,) = happened(rig, events.SetInvalidated)
     assert str(invalidated.at) == "P2"
@@ -126,8 +127,7 @@ async def test_a_small_jump_while_it_was_away_costs_the_set(at_second_point) -> 
     assert float(shown[1]) == pytest.approx(0.2, abs=0.01)
 
 
-async def test_a_device_that_cannot_be_reopened_ends_the_run(at_second_point) -> None:
-    rig = at_second_point
+async def test_a_device_that_cannot_be_reopened_ends_the_run(rig) -> None:
     encoders = rig.bench.encoders
     encoders_lost = BusError("has died", subject="encoder bus")
 
@@ -139,8 +139,7 @@ async def test_a_device_that_cannot_be_reopened_ends_the_run(at_second_point) ->
     assert len(happened(rig, events.Failed)) == 3
 
 
-async def test_a_void_zero_invalidates_the_set(at_second_point) -> None:
-    rig = at_second_point
+async def test_a_void_zero_invalidates_the_set(rig) -> None:
     gauge = rig.gauges[0]
     void = ZeroVoid("was off in between", subject="gauge x")
 
@@ -157,8 +156,7 @@ async def test_a_void_zero_invalidates_the_set(at_second_point) -> None:
     assert voided.reason == "a gauge was opened again, its zero is void"
 
 
-async def test_a_robot_that_cannot_be_stopped_ends_the_run_without_recovery(at_second_point) -> None:
-    rig = at_second_point
+async def test_a_robot_that_cannot_be_stopped_ends_the_run_without_recovery(rig) -> None:
 
     def break_down() -> None:
         rig.gauges[1].failures.append(SILENT)
@@ -172,8 +170,7 @@ async def test_a_robot_that_cannot_be_stopped_ends_the_run_without_recovery(at_s
 @pytest.mark.parametrize(
     ("choice", "voided"), [(Action.RETRY, 0), (Action.MEASURE_AGAIN, 1), (Action.REDO_SET, 1)]
 )
-async def test_the_recovery_chosen_by_the_operator_is_executed(at_second_point, choice, voided) -> None:
-    rig = at_second_point
+async def test_the_recovery_chosen_by_the_operator_is_executed(rig, choice, voided) -> None:
     rig.operator.decisions = [choice]
     silent = failing(KEY, lambda: rig.gauges[1].failures.append(SILENT))
     assert await until_closed(rig, silent, policy=ATTENDED)
@@ -183,8 +180,7 @@ async def test_the_recovery_chosen_by_the_operator_is_executed(at_second_point, 
     assert len(happened(rig, events.SetInvalidated)) == voided, "one that was opened again costs it"
 
 
-async def test_a_fault_rejects_other_commands_until_it_is_answered(at_second_point) -> None:
-    rig = at_second_point
+async def test_a_fault_rejects_other_commands_until_it_is_answered(rig) -> None:
     asked = asyncio.Event()
 
     async def never(*_: Any) -> Action:

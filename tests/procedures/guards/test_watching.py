@@ -20,6 +20,7 @@ from procedures.steps import events
 from procedures.steps.close import CloseSet
 from procedures.steps.move import Expectation, Move
 from procedures.steps.sample import Sample
+from tests.waiting import cancel
 
 LIMITS = GuardLimits(0.12, GaugeRoom.symmetric(5.5))
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
@@ -36,10 +37,13 @@ def sample(orientation: int, at: SetKey = P1) -> Sample:
     return Sample(at=at, orientation=orientation, pose=move(orientation, at).pose)
 
 
-async def reference(scene: Any) -> Any:
+@pytest.fixture
+async def stage(scene: Any) -> Any:
+    """A scene whose first reference is measured."""
+    made = scene()
     for step in (move(1), sample(1)):
-        await scene.do(step)
-    return scene
+        await made.do(step)
+    return made
 
 
 async def test_two_complete_sets_trip_no_guard(scene) -> None:
@@ -55,8 +59,7 @@ async def test_two_complete_sets_trip_no_guard(scene) -> None:
     assert stage.stops == 0
 
 
-async def test_a_move_begins_after_every_device_has_answered(scene) -> None:
-    stage = await reference(scene())
+async def test_a_move_begins_after_every_device_has_answered(stage) -> None:
     begun: list[float] = []
     real = stage.controller.move
 
@@ -71,8 +74,7 @@ async def test_a_move_begins_after_every_device_has_answered(scene) -> None:
 
 
 @pytest.mark.parametrize("device", ["gauge y", "encoders", "controller"])
-async def test_a_device_silent_before_a_move_prevents_the_move(scene, device: str) -> None:
-    stage = await reference(scene())
+async def test_a_device_silent_before_a_move_prevents_the_move(stage, device: str) -> None:
     moves = stage.controller.log.count
     before = len(stage.controller.log)
     stage.silent.add(device)
@@ -83,8 +85,7 @@ async def test_a_device_silent_before_a_move_prevents_the_move(scene, device: st
     assert len(stage.controller.log) == before
 
 
-async def test_a_trip_stays_latched_until_the_controller_is_prepared_again(scene) -> None:
-    stage = await reference(scene())
+async def test_a_trip_stays_latched_until_the_controller_is_prepared_again(stage) -> None:
     stage.forbidden = "the button is pressed"
     with pytest.raises(GuardTripped, match="the button"):
         await stage.do(move(2))
@@ -98,8 +99,7 @@ async def test_a_trip_stays_latched_until_the_controller_is_prepared_again(scene
     await stage.do(move(2))
 
 
-async def test_a_robot_that_cannot_be_stopped_is_reported(scene) -> None:
-    stage = await reference(scene())
+async def test_a_robot_that_cannot_be_stopped_is_reported(stage) -> None:
     stage.controller.stop = AsyncMock(side_effect=DeviceError("does not answer", subject="controller"))
     moving = asyncio.ensure_future(stage.do(move(2)))
     await stage.rig.clock.sleep(0.3)
@@ -108,9 +108,7 @@ async def test_a_robot_that_cannot_be_stopped_is_reported(scene) -> None:
         await moving
 
 
-async def test_a_failed_move_is_reported_as_the_trip_of_the_guard_with_its_cause(scene) -> None:
-    stage = await reference(scene())
-
+async def test_a_failed_move_is_reported_as_the_trip_of_the_guard_with_its_cause(stage) -> None:
     async def interrupted(pose: Any, duration_s: float) -> None:
         stage.switch_off("joint 2 following error")
         raise DeviceError("stopped on the way", subject="controller")
@@ -121,8 +119,7 @@ async def test_a_failed_move_is_reported_as_the_trip_of_the_guard_with_its_cause
     assert isinstance(tripped.value.__cause__, DeviceError)
 
 
-async def test_a_move_that_fails_without_a_trip_raises_its_own_error(scene) -> None:
-    stage = await reference(scene())
+async def test_a_move_that_fails_without_a_trip_raises_its_own_error(stage) -> None:
     stage.controller.failures["move"] = DeviceError("cannot go there", subject="controller")
     with pytest.raises(DeviceError, match="cannot go there") as failed:
         await stage.do(move(2))
@@ -130,25 +127,20 @@ async def test_a_move_that_fails_without_a_trip_raises_its_own_error(scene) -> N
     await stage.do(move(2))
 
 
-async def test_a_programming_error_in_the_guards_ends_the_move(scene) -> None:
-    stage = await reference(scene())
+async def test_a_programming_error_in_the_guards_ends_the_move(stage) -> None:
     stage.active_reason = AsyncMock(side_effect=ZeroDivisionError)
     with pytest.raises(ZeroDivisionError):
         await stage.do(move(2))
 
 
-async def test_cancelling_ends_the_action_and_the_watch(scene) -> None:
-    stage = await reference(scene())
+async def test_cancelling_ends_the_action_and_the_watch(stage) -> None:
     moving = asyncio.ensure_future(stage.do(move(2)))
     await stage.rig.clock.sleep(0.3)
-    moving.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await moving
+    await cancel(moving)
     assert stage.rig.performer.guards.supervisor.latched is None
 
 
-async def test_garbled_answers_on_a_noisy_line_trip_no_guard(scene) -> None:
-    stage = await reference(scene())
+async def test_garbled_answers_on_a_noisy_line_trip_no_guard(stage) -> None:
     gauge = stage.rig.gauges[1]
     real, asked = gauge.read_once, [0]
 
@@ -165,8 +157,7 @@ async def test_garbled_answers_on_a_noisy_line_trip_no_guard(scene) -> None:
     assert asked[0] > 3
 
 
-async def test_gauges_are_not_read_during_a_move_to_another_point(scene) -> None:
-    stage = await reference(scene())
+async def test_gauges_are_not_read_during_a_move_to_another_point(stage) -> None:
     for gauge in stage.rig.gauges:
         gauge.read_once = AsyncMock(side_effect=AssertionError("its zero would be void"))
     await stage.do(move(1, P2))
@@ -174,9 +165,8 @@ async def test_gauges_are_not_read_during_a_move_to_another_point(scene) -> None
 
 
 @pytest.mark.parametrize("from_elsewhere", [False, True])
-async def test_gauges_are_not_monitored_on_the_return_from_elsewhere(scene, from_elsewhere: bool) -> None:
+async def test_gauges_are_not_monitored_on_the_return_from_elsewhere(stage, from_elsewhere: bool) -> None:
     """There a gauge may show something, and be at its end on the way."""
-    stage = await reference(scene())
     back = move(2).model_copy(update={"from_elsewhere": from_elsewhere})
     moving = asyncio.ensure_future(stage.do(back))
     await stage.rig.clock.sleep(0.3)
@@ -188,8 +178,7 @@ async def test_gauges_are_not_monitored_on_the_return_from_elsewhere(scene, from
         await moving
 
 
-async def test_a_move_that_begins_at_the_end_of_a_plunger_may_lead_away_from_it(scene) -> None:
-    stage = await reference(scene())
+async def test_a_move_that_begins_at_the_end_of_a_plunger_may_lead_away_from_it(stage) -> None:
     stage.at_end.add("x")
     moving = asyncio.ensure_future(stage.do(move(2)))
     await stage.rig.clock.sleep(0.4)
@@ -197,8 +186,7 @@ async def test_a_move_that_begins_at_the_end_of_a_plunger_may_lead_away_from_it(
     await moving
 
 
-async def test_a_slider_away_from_its_commanded_position_trips_the_following_guard(scene) -> None:
-    stage = await reference(scene())
+async def test_a_slider_away_from_its_commanded_position_trips_the_following_guard(stage) -> None:
     stage.slip_mm = -1.5
     with pytest.raises(GuardTripped, match=r"slider \d: is -1\.\d+ mm from its commanded") as tripped:
         await stage.do(move(2))
@@ -210,8 +198,7 @@ EXPECTED = Expectation(deviation_mm=(0.0, 0.0, 3.0), sigma_mm=(0.1, 0.1, 0.1), g
 
 
 @pytest.mark.parametrize(("sigma", "trips"), [(0.1, True), (0.5, False)])
-async def test_a_gauge_that_does_not_change_during_a_move_trips_the_stale_guard(scene, sigma, trips):
-    stage = await reference(scene())
+async def test_a_gauge_that_does_not_change_during_a_move_trips_the_stale_guard(stage, sigma, trips):
     stage.frozen["z"] = stage.rig.gauges[2].shown()
     step = move(2, expected=EXPECTED.model_copy(update={"sigma_mm": (sigma,) * 3}))
     if not trips:

@@ -1,7 +1,7 @@
 """A server that follows a script, and drivers that talk to it."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import suppress
 from enum import Enum, auto
 from typing import Any
@@ -93,6 +93,12 @@ class Pause(asyncio.Event):
     def __init__(self) -> None:
         super().__init__()
         self.reached = asyncio.Event()
+
+    async def reached_by(self, order: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
+        """The task of this order, once the server waits here."""
+        task = asyncio.create_task(order)
+        await self.reached.wait()
+        return task
 
 
 Step = bytes | Pause | Then

@@ -20,7 +20,7 @@ from tests.drivers.controllers.linuxcnc.conftest import (
     said,
 )
 from tests.linuxcnc_orders import joints_of, pose_of
-from tests.waiting import until
+from tests.waiting import cancel, until
 
 
 async def test_a_cancelled_move_is_stopped_and_its_late_answer_is_discarded(play):
@@ -29,11 +29,7 @@ async def test_a_cancelled_move_is_stopped_and_its_late_answer_is_discarded(play
         [(MDI, aborted, ACK), AGAIN_IN_CONTROL, (MDI, ACK), ("get abs_act_pos", ARRIVED), RESTORED],
         play.STOPPING,
     )
-    moving = asyncio.create_task(driver.move(TARGET, MOVE_S))
-    await aborted.reached.wait()
-    moving.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await moving
+    await cancel(await aborted.reached_by(driver.move(TARGET, MOVE_S)))
     aborted.set()
     await driver.move(TARGET, MOVE_S)
 
@@ -41,11 +37,7 @@ async def test_a_cancelled_move_is_stopped_and_its_late_answer_is_discarded(play
 async def test_a_cancelled_move_raises_the_cancellation_even_if_the_stop_fails(play):
     never = play.Pause()
     driver = await play.opened([(MDI, never)], *[[("hello EMC hexacell 1.0", play.HANG_UP)]] * 3)
-    moving = asyncio.create_task(driver.move(TARGET, MOVE_S))
-    await never.reached.wait()
-    moving.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await moving
+    await cancel(await never.reached_by(driver.move(TARGET, MOVE_S)))
 
 
 async def test_a_move_cancelled_before_its_turn_stops_nothing(play):
@@ -53,8 +45,7 @@ async def test_a_move_cancelled_before_its_turn_stops_nothing(play):
     driver = await play.opened([("get joint_pos", answer, b"JOINT_POS 1 2 3 4 5 6\r\n")])
     asking = asyncio.create_task(joints_of(driver))
     await asyncio.sleep(0)
-    moving = asyncio.create_task(driver.move(TARGET, MOVE_S))
-    await answer.reached.wait()
+    moving = await answer.reached_by(driver.move(TARGET, MOVE_S))
     moving.cancel()
     answer.set()
     assert await asking == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
@@ -70,11 +61,7 @@ async def test_the_late_answer_to_a_cancelled_query_is_discarded(play):
             ("get joint_pos", b"JOINT_POS 6 5 4 3 2 1\r\n"),
         ]
     )
-    asking = asyncio.create_task(joints_of(driver))
-    await late.reached.wait()
-    asking.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await asking
+    await cancel(await late.reached_by(joints_of(driver)))
     late.set()
     assert await joints_of(driver) == (6.0, 5.0, 4.0, 3.0, 2.0, 1.0)
 
@@ -116,8 +103,7 @@ async def test_closing_ends_a_query_in_progress(play):
     play.patience = Timeouts(answer=3600.0)
     never = play.Pause()
     driver = await play.opened([("get joint_pos", never)])
-    asking = asyncio.create_task(joints_of(driver))
-    await never.reached.wait()
+    asking = await never.reached_by(joints_of(driver))
     await driver.close()
     with pytest.raises(DeviceError):
         await asking

@@ -31,7 +31,7 @@ from tests.drivers.controllers.linuxcnc.conftest import (
     Then,
     said,
 )
-from tests.waiting import until
+from tests.waiting import cancel, until
 
 RESTARTED = frozenset({StartupAction.RESET_INITIAL_ESTOP, StartupAction.HOME})
 """What the cell file permits; to be switched on again needs no permission."""
@@ -171,9 +171,7 @@ async def test_a_reload_command_that_exceeds_its_timeout_is_killed(tmp_path):
 async def test_a_cancelled_reload_command_is_killed(tmp_path):
     running = asyncio.create_task(run_reload_command(_saying_who(tmp_path), "controller", 1800.0))
     await until((tmp_path / "pid").exists)
-    running.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await running
+    await cancel(running)
     _expect_gone(tmp_path)
 
 

@@ -15,6 +15,7 @@ from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError, ExitCode, UsageError
 from tests.drivers.controllers.linuxcnc.conftest import said
 from tests.linuxcnc_orders import pose_of
+from tests.waiting import cancel
 
 HELLO = "hello EMC hexacell 1.0"
 
@@ -118,11 +119,7 @@ async def test_a_password_that_would_overrun_the_servers_buffer_is_not_sent(play
 async def test_a_cancelled_opening_leaves_nothing_behind(play):
     never = play.Pause()
     driver = await play.driver([*play.GREETING[:2], ("set verbose on", never)])
-    opening = asyncio.create_task(driver.open())
-    await never.reached.wait()
-    opening.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await opening
+    await cancel(await never.reached_by(driver.open()))
 
 
 async def test_closing_during_opening_ends_the_opening(play):
@@ -130,8 +127,7 @@ async def test_closing_during_opening_ends_the_opening(play):
     driver = await play.driver(
         [*play.GREETING[:2], ("set verbose on", greeted, b"SET VERBOSE ACK\n\r"), *play.OPENING[3:5]]
     )
-    opening = asyncio.create_task(driver.open())
-    await greeted.reached.wait()
+    opening = await greeted.reached_by(driver.open())
     await driver.close()
     greeted.set()
     with pytest.raises(DeviceError, match="is not connected"):

@@ -1,7 +1,5 @@
 """Preparing for motion: every state is verified after its command is acknowledged."""
 
-import asyncio
-
 import pytest
 
 from drivers.errors import CommandRefused, MotionInterrupted, MoveRefused, StartupNotPermitted
@@ -189,8 +187,7 @@ async def test_a_stop_during_prepare_prevents_homing(play):
     held = [IN_JOINT_MODE[0], ("get teleop_enable", stopped, b"TELEOP_ENABLE NO\r\n"), NO_ERROR]
     main = [*UNTIL_HOMED, *ON_NOT_HOMED, *OWN_COORDINATES, *held]
     driver = await play.opened(main, play.STOPPING)
-    preparing = asyncio.create_task(driver.prepare(ALL))
-    await stopped.reached.wait()
+    preparing = await stopped.reached_by(driver.prepare(ALL))
     await driver.stop()
     stopped.set()
     with pytest.raises(MotionInterrupted, match="was stopped before it was ready"):

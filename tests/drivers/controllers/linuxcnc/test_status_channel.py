@@ -72,8 +72,7 @@ async def test_status_has_the_messages_that_the_order_is_reading(play) -> None:
     main = [*REFUSED, FAULT, ("get error", reading, b"ERROR OK\r\n")]
     driver = await play.opened(main, [*LOOKING_ON, *asked(), *TURNED_OFF, NO_ERROR])
     await driver.status()
-    moving = asyncio.create_task(driver.move(TARGET, MOVE_S))
-    await reading.reached.wait()
+    moving = await reading.reached_by(driver.move(TARGET, MOVE_S))
     status = asyncio.create_task(driver.status())
     reading.set()
     assert (await status).error_messages == ("joint 3 following error",)
@@ -86,8 +85,7 @@ async def test_an_order_has_the_messages_that_the_status_read(play) -> None:
     main = [(MDI, refused, NAK), *said("get enable: ON | get error: OK")]
     driver = await play.opened(main, [*LOOKING_ON, *asked(), *TURNED_OFF, FAULT, NO_ERROR])
     await driver.status()
-    moving = asyncio.create_task(driver.move(TARGET, MOVE_S))
-    await refused.reached.wait()
+    moving = await refused.reached_by(driver.move(TARGET, MOVE_S))
     assert (await driver.status()).error_messages == ("joint 3 following error",)
     refused.set()
     with pytest.raises(MoveRefused, match="joint 3 following error"):
@@ -100,8 +98,7 @@ async def test_a_message_whose_reading_is_cancelled_is_kept(play) -> None:
     told = [*TURNED_OFF, message, NO_ERROR, *TURNED_OFF, NO_ERROR]
     driver = await play.opened([], [*LOOKING_ON, *asked(), *told])
     await driver.status()
-    cancelled = asyncio.create_task(driver.status())
-    await reading.reached.wait()
+    cancelled = await reading.reached_by(driver.status())
     cancelled.cancel()
     reading.set()
     with pytest.raises(asyncio.CancelledError):
@@ -120,8 +117,7 @@ async def test_the_status_is_read_during_a_move(play) -> None:
     arrived = play.Pause()
     main = [(MDI, arrived, ACK), MOVED[1], RESTORED]
     driver = await play.opened(main, [*LOOKING_ON, *asked()])
-    moving = asyncio.create_task(driver.move(TARGET, MOVE_S))
-    await arrived.reached.wait()
+    moving = await arrived.reached_by(driver.move(TARGET, MOVE_S))
     assert await driver.status() == ON
     assert not moving.done()
     arrived.set()
@@ -156,8 +152,7 @@ async def test_the_status_is_not_read_during_a_stop(play) -> None:
     driver = await play.opened([], stopping, [*LOOKING_ON, *asked()])
     stop = asyncio.create_task(driver.stop())
     await asyncio.sleep(0)
-    looking = asyncio.create_task(driver.status())
-    await at_rest.reached.wait()
+    looking = await at_rest.reached_by(driver.status())
     assert play.servers[0].connections == 2
     at_rest.set()
     await stop
@@ -170,8 +165,7 @@ async def test_a_stop_during_a_move_is_reported_by_the_move(play) -> None:
     main = [(MDI, stopped, ACK), ("get abs_act_pos", HALF_WAY)]
     driver = await play.opened(main, [*LOOKING_ON, *asked(), AGAIN_IN_CONTROL, *play.STOPPED])
     await driver.status()
-    moving = asyncio.create_task(driver.move(TARGET, MOVE_S))
-    await stopped.reached.wait()
+    moving = await stopped.reached_by(driver.move(TARGET, MOVE_S))
     await driver.stop()
     stopped.set()
     with pytest.raises(MotionInterrupted, match="it was stopped on request"):
@@ -183,8 +177,7 @@ async def test_a_move_that_is_refused_because_a_stop_took_control_was_stopped(pl
     main = [(MDI, received, NAK), *said("get enable: OFF")]
     driver = await play.opened(main, [*LOOKING_ON, *asked(), AGAIN_IN_CONTROL, *play.STOPPED])
     await driver.status()
-    moving = asyncio.create_task(driver.move(TARGET, MOVE_S))
-    await received.reached.wait()
+    moving = await received.reached_by(driver.move(TARGET, MOVE_S))
     await driver.stop()
     received.set()
     with pytest.raises(MotionInterrupted, match="was stopped before it moved"):

@@ -27,8 +27,7 @@ async def test_stopping_goes_over_a_second_connection_while_the_first_is_mute(pl
         [(MDI, aborted, ACK), ("get abs_act_pos", HALF_WAY), AGAIN_IN_CONTROL, *MOVED, RESTORED],
         [*play.GREETING, *play.STOPPED],
     )
-    moving = asyncio.create_task(driver.move(TARGET, MOVE_S))
-    await aborted.reached.wait()
+    moving = await aborted.reached_by(driver.move(TARGET, MOVE_S))
     await driver.stop()
     aborted.set()
     with pytest.raises(MotionInterrupted, match=r"stopped at X5\.000 .*: it was stopped on request"):
@@ -45,8 +44,7 @@ async def test_no_command_is_sent_on_one_connection_while_the_other_awaits_an_an
     )
     moving = asyncio.create_task(driver.move(TARGET, MOVE_S))
     await asyncio.sleep(0)
-    stopping = asyncio.create_task(driver.stop())
-    await speak.reached.wait()
+    stopping = await speak.reached_by(driver.stop())
     silent_so_far = not moving.done()
     speak.set()
     await stopping
@@ -105,8 +103,7 @@ async def test_the_driver_does_not_reconnect_during_a_stop(play):
     )
     await joints_of(driver)
     stopping = asyncio.create_task(driver.stop())
-    asking = asyncio.create_task(joints_of(driver))
-    await speak.reached.wait()
+    asking = await speak.reached_by(joints_of(driver))
     connections_so_far = play.servers[0].connections
     speak.set()
     await asyncio.gather(stopping, asking)
@@ -121,10 +118,8 @@ async def test_a_move_that_waits_for_its_turn_is_not_begun_after_a_stop(play):
         [*play.GREETING, ("set abort", abort, b"SET ABORT ACK\n\r"), *play.STOPPING[-3:]],
     )
     asking = asyncio.create_task(joints_of(driver))
-    moving = asyncio.create_task(driver.move(TARGET, MOVE_S))
-    await answer.reached.wait()
-    stopping = asyncio.create_task(driver.stop())
-    await abort.reached.wait()
+    moving = await answer.reached_by(driver.move(TARGET, MOVE_S))
+    stopping = await abort.reached_by(driver.stop())
     abort.set()
     answer.set()
     await asking

@@ -18,14 +18,7 @@ MESSAGE = (
     'BO_ {id} ENC{leg}: 6 ENC\n SG_ Position : 0|32@1- (0.0005,0) [-2000|2000] "{unit}" PC\n'
     ' SG_ Error : 32|8@1+ (1,0) [0|255] "" PC\n'
 )
-SIGNALS = (
-    "ENC1.Position",
-    "ENC2.Position",
-    "ENC3.Position",
-    "ENC4.Position",
-    "ENC5.Position",
-    "ENC6.Position",
-)
+SIGNALS = tuple(f"ENC{leg}.Position" for leg in range(1, 7))
 
 
 def dbc_text(unit: str = "mm") -> str:

@@ -55,16 +55,10 @@ async def test_overspeed_voids_the_zero_until_it_is_opened_again(dialogue, opene
     assert (await opened.read()).value_mm == 1.0
 
 
-async def test_an_inch_gauge_is_refused(dialogue, gauge):
-    dialogue.expect(*opening(UNI=b"IN\r") * 3)
-    with pytest.raises(WrongSetting) as caught:
-        await gauge.open()
-    assert str(caught.value) == "gauge y: answers in inch. Press its in/mm key"
-
-
 @pytest.mark.parametrize(
     ("answers", "words"),
     [
+        ({"UNI": b"IN\r"}, "gauge y: answers in inch. Press its in/mm key"),
         ({"STO": b"STO1\r"}, "is on hold"),
         ({"MOD": b"MIN\r"}, "is in mode MIN"),
         ({"MOD": b"MAX\r"}, "is in mode MAX"),

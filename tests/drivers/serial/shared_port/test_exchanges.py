@@ -20,7 +20,7 @@ from tests.drivers.serial.shared_port.conftest import (
     opened,
     written,
 )
-from tests.waiting import until
+from tests.waiting import cancel, until
 
 
 async def test_an_answer_is_complete_and_read_by_one_thread(fake):
@@ -128,9 +128,7 @@ async def test_a_cancelled_exchange_leaves_the_port_synchronized(fake):
     link = await opened()
     first = asyncio.create_task(link.exchange(b"1\r", b"\r", FOREVER_S))
     await written(port)
-    first.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await first
+    await cancel(first)
     answering.set()
     assert await link.exchange(b"2\r", b"\r", FOREVER_S) == b"to 2\r"
     assert link.take_unsolicited() == b""
@@ -180,9 +178,7 @@ async def test_a_cancelled_close_closes_all_the_same(fake):
     link = await opened()
     closing = asyncio.create_task(link.close())
     await asyncio.sleep(0)
-    closing.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await closing
+    await cancel(closing)
     await until(lambda: not port.is_open)
 
 

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from hexacell.kinematics.pose import Pose
 from hexacell.robot.virtual_robot import exact_records
@@ -16,13 +15,9 @@ POSES = [
 ]
 
 
-@pytest.fixture
-def silent(make_plan):
+def test_exact_records_have_the_directions_of_the_straight_ways(make_plan):
     robot = make_plan().robot
-    return replace(robot, noise=replace(robot.noise, encoder=0.0, gauge_mm=0.0, stops=0.0))
-
-
-def test_exact_records_have_the_directions_of_the_straight_ways(silent):
+    silent = replace(robot, noise=replace(robot.noise, encoder=0.0, gauge_mm=0.0, stops=0.0))
     commands = silent.from_commands([REFERENCE, *POSES])
     records = [*exact_records(silent, 1, commands)]
     joints = np.array([one.joints for one in records])

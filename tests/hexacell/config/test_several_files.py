@@ -138,9 +138,7 @@ def test_the_note_is_no_more_readable_than_the_files(bench: Bench) -> None:
     assert note_path(bench.files).stat().st_mode & 0o077 == 0
 
 
-def test_a_second_file_that_cannot_be_written_stops_it_before_the_first(
-    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_second_file_that_cannot_be_written_stops_it_before_the_first(bench, tmp_path, monkeypatch):
     real = os.access
 
     def access(path: Any, mode: int, **options: Any) -> bool:

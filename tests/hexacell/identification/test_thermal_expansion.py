@@ -133,9 +133,7 @@ def test_a_leg_without_a_thermometer_is_like_the_base() -> None:
 
 
 @pytest.mark.parametrize(("column", "share"), [(0, (1.1, 1.0)), (1, (1.0, 1.1))])
-def test_what_is_not_known_of_the_expansion_acts_as_its_error_does(
-    told, make_problem, column, share
-) -> None:
+def test_what_is_not_known_of_the_expansion_acts_as_its_error_does(told, make_problem, column, share):
     coefficients = np.array([UM_M_K, 10.0])
     expansions = ThermalExpansion(*coefficients), ThermalExpansion(*(coefficients * share))
     right, wrong = (make_problem(told, expansion=one) for one in expansions)

@@ -13,7 +13,6 @@ from hexacell.design.candidates import commands_for, orientations, reachable_tar
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.motion import paths
 from hexacell.motion import paths as module
 from hexacell.motion.path_check import ball_position, is_clear
 from hexacell.motion.paths import WAYPOINT_PIECES, PathPlanner, find_route, next_return_move
@@ -134,8 +133,8 @@ def plan(monkeypatch: pytest.MonkeyPatch) -> Any:
             asked.append(start.pose(0).a)
             return SimpleNamespace(plan=lambda _: [SimpleNamespace(waypoints=waypoints) if found else None])
 
-        monkeypatch.setattr(paths, "PathPlanner", planner)
-        monkeypatch.setattr(paths, "is_clear", lambda _, __, end, ___: round(end.pose(0).a) in clear_to)
+        monkeypatch.setattr(module, "PathPlanner", planner)
+        monkeypatch.setattr(module, "is_clear", lambda _, __, end, ___: round(end.pose(0).a) in clear_to)
         return asked
 
     return planned

@@ -223,9 +223,7 @@ async def test_anybody_may_read_only_where_the_cell_says_so(cell, client_files, 
     assert warnings
 
 
-async def test_a_password_that_others_can_read_and_a_port_that_is_taken_are_refused(
-    cell, monkeypatch
-) -> None:
+async def test_a_password_that_others_can_read_and_a_port_that_is_taken_are_refused(cell, monkeypatch):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()

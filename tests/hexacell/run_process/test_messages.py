@@ -68,7 +68,7 @@ def from_host(sent: HostMessage) -> HostMessage:
 
 
 @pytest.mark.parametrize("kind", EVENTS, ids=lambda kind: kind.__name__)
-def test_every_event_arrives_as_it_was_sent(kind) -> None:
+def test_every_event_arrives_as_it_was_sent(kind):
     @SAME_EACH_TIME
     @given(valid(kind))
     def arrives(event: Any) -> None:
@@ -79,7 +79,7 @@ def test_every_event_arrives_as_it_was_sent(kind) -> None:
 
 
 @pytest.mark.parametrize("kind", COMMANDS, ids=lambda kind: kind.__name__)
-def test_every_command_arrives_as_it_was_given(kind) -> None:
+def test_every_command_arrives_as_it_was_given(kind):
     @SAME_EACH_TIME
     @given(valid(kind))
     def arrives(command: Any) -> None:

@@ -90,9 +90,7 @@ def test_cell_files_of_one_robot_have_one_socket(cell, tmp_path, monkeypatch) ->
     assert same.parent == tmp_path / "hexacell"
 
 
-def test_without_a_runtime_folder_it_is_in_that_of_temporary_files(
-    cell, tmp_path_factory, monkeypatch
-) -> None:
+def test_without_a_runtime_folder_it_is_in_that_of_temporary_files(cell, tmp_path_factory, monkeypatch):
     tmp_path = tmp_path_factory.mktemp("r")  # the path of a socket must be short
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "absent"))

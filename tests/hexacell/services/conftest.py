@@ -176,8 +176,3 @@ class Approver:
 
     async def ask(self, question: Question) -> str | None:
         return question.default or (question.choices or ("a tester",))[-1]
-
-
-@pytest.fixture
-def approver() -> Approver:
-    return Approver()

@@ -20,15 +20,13 @@ from procedures.run.keys import Phase
 from procedures.run.state import fold
 from procedures.steps import events
 from procedures.steps.move import Move
-from tests.hexacell.services.conftest import Approver, Finished, Site
+from tests.hexacell.services.conftest import Approver
 
 THREE_POINTS = ((100.0, -100.0, 500.0), (0.0, 150.0, 520.0), (-100.0, 100.0, 500.0))
 """The first and the last are the points of the cell that was calibrated."""
 
 
-async def test_others_are_measured_in_their_place_and_points_are_left(
-    make_site: Callable[..., Site], finished: Finished, approver: Approver
-) -> None:
+async def test_others_are_measured_in_their_place_and_points_are_left(make_site, finished):
     samples = fold(finished.history).samples(Phase.IDENTIFY)
     poses = [one.pose for one in samples if one.orientation in {3, 6}]
     assert len(poses) == 4
@@ -44,7 +42,7 @@ async def test_others_are_measured_in_their_place_and_points_are_left(
         if isinstance(event, events.SetClosed):
             queue.put(Abort())
 
-    changes = {"operator": approver, "unattended": False}
+    changes = {"operator": Approver(), "unattended": False}
     for resume in (False, True):
         with pytest.raises(Interruption):
             await calibrate(site.order(resume=resume, **changes), [stop_early], queue)

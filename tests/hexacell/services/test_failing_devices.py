@@ -3,7 +3,6 @@
 import logging
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -21,13 +20,6 @@ from tests.procedures.runs.listening import failing, on, stop_here
 UNPLUGGED: FaultKind = "unplugged"
 
 
-@pytest.fixture
-def at_second_point(finished, make_site) -> Any:
-    site = make_site()
-    site.write(finished.until(events.SetClosed), finished)
-    return site
-
-
 @pytest.mark.parametrize(
     ("kind", "device", "step", "voids"),
     [
@@ -37,9 +29,10 @@ def at_second_point(finished, make_site) -> Any:
     ],
 )
 async def test_an_unplugged_device_that_is_plugged_in_again_is_recovered(
-    at_second_point, kind, device, step, voids
+    finished, make_site, kind, device, step, voids
 ) -> None:
-    site = at_second_point
+    site = make_site()
+    site.write(finished.until(events.SetClosed), finished)
     pull_out = failing(step, lambda: site.simulated.faults.inject(kind, device))
     plug_in = on(events.Failed, lambda: site.simulated.faults.clear(kind, device), count=None)
     with pytest.raises(Interruption):
@@ -93,9 +86,7 @@ def in_the_room(tmp_path: Path) -> ThermometerSettings:
     return ThermometerSettings(name="room", path=str(path))
 
 
-async def test_temperatures_are_in_the_journal_and_do_not_change_its_replay(
-    make_site, tmp_path, caplog
-) -> None:
+async def test_temperatures_are_in_the_journal_and_do_not_change_its_replay(make_site, tmp_path, caplog):
     nowhere = ThermometerSettings(name="rails", path=str(tmp_path / "nowhere"))
     site = make_site(thermometers=(in_the_room(tmp_path), nowhere))
     with caplog.at_level(logging.WARNING):

@@ -1,6 +1,5 @@
 """Failures at the end of a run, through real drivers: the controller's config is correct in each case."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -20,18 +19,6 @@ from procedures.steps import events
 from tests.geometries import hexaglide_geometry
 from tests.procedures.runs.listening import on
 from tests.small_cell import FEW_CHOICES
-
-
-@pytest.fixture
-def proposed(finished, make_site) -> Callable[..., Any]:
-    """A site whose run has come to its proposal."""
-
-    def make(**changes: Any) -> Any:
-        site = make_site(**changes)
-        site.write(finished.until(events.Proposed), finished)
-        return site
-
-    return make
 
 
 async def test_what_rests_on_an_expired_certificate_needs_a_person(finished, make_site) -> None:
@@ -73,9 +60,10 @@ def _drawing(site: Any) -> Geometry:
 
 
 async def test_a_better_result_that_held_out_records_contradict_is_rolled_back_bit_for_bit(
-    proposed, finished
+    make_site, finished
 ) -> None:
-    site = proposed()
+    site = make_site()
+    site.write(finished.until(events.Proposed), finished)
     # So little that the gauges still follow, whichever poses the records led to.
     ended = await site.calibrate(on(events.Committed, lambda: bend(site, 0.05)), resume=True)
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS

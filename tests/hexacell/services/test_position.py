@@ -97,9 +97,7 @@ async def test_an_offset_of_the_controller_is_found_by_preflight_before_it_is_ho
     assert state.estop
 
 
-async def test_a_controller_that_counts_in_inches_measures_with_the_new_geometry(
-    finished, make_site
-) -> None:
+async def test_a_controller_that_counts_in_inches_measures_with_the_new_geometry(finished, make_site):
     site = make_site(**{"controller.unit_mm": 25.4})
     site.write(finished.until(events.Proposed), finished)
     assert (await site.calibrate(resume=True)).exit_code == ExitCode.DONE
@@ -119,9 +117,7 @@ async def test_a_controller_that_keeps_its_old_config_gets_the_file_back(finishe
 
 
 @pytest.mark.parametrize("includes_zeros", [pytest.param(False, marks=pytest.mark.slow), True])
-async def test_encoders_that_the_controller_reads_need_not_be_homed_before_a_run(
-    make_site, includes_zeros
-) -> None:
+async def test_encoders_that_the_controller_reads_need_not_be_homed_before_a_run(make_site, includes_zeros):
     controller = {"controller.joints_include_zeros": includes_zeros}
     site = make_site(**{"encoders.protocol": "controller"} | controller)
     cell = site.order().cell

@@ -45,11 +45,6 @@ def drifted_cell(folder: Path, finished: Finished) -> Cell:
     return cell
 
 
-@pytest.fixture
-def drifted(tmp_path, finished) -> Cell:
-    return drifted_cell(tmp_path, finished)
-
-
 @dataclass(frozen=True)
 class Corrected:
     """The same after a run of the quick level."""

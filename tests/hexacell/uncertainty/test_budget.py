@@ -32,13 +32,6 @@ def budget_of(laboratory):
     return budget
 
 
-@pytest.fixture(scope="module")
-def near(visit, make_problem, paper):
-    """From records whose ball hardly leaves its zero, as of a calibrated robot."""
-    exact = visit(commanding=paper.actual, degrees=40.0).measured()
-    return identify(make_problem(exact, controller=paper.actual), find_outliers=False)
-
-
 EFFECTS = (encoder_scales(10.0), rail_waves(5.0, 600.0), stop_repeatability(2.0), ball_roundness(2.0))
 
 
@@ -88,7 +81,10 @@ def test_residuals_larger_than_the_noise_widen_the_noise_line(laboratory, visit,
     assert factor == pytest.approx(found.goodness.noise_factor)
 
 
-def test_what_no_record_shows_is_listed(near, budget_of) -> None:
+def test_what_no_record_shows_is_listed(visit, make_problem, paper, budget_of) -> None:
+    """From records whose ball hardly leaves its zero, as of a calibrated robot."""
+    exact = visit(commanding=paper.actual, degrees=40.0).measured()
+    near = identify(make_problem(exact, controller=paper.actual), find_outliers=False)
     effects = (
         *EFFECTS,
         rail_directions(0.02),
@@ -119,9 +115,7 @@ def test_a_geometry_beside_the_estimate_errs_by_the_difference_with_the_same_unc
     )
 
 
-def test_a_budget_with_an_earlier_one_has_its_effects_on_the_prior(
-    laboratory, exact, visit, budget_of
-) -> None:
+def test_a_budget_with_an_earlier_one_has_its_effects_on_the_prior(laboratory, exact, visit, budget_of):
     """Without them, a short update of a calibrated robot would seem to err by all that cancels."""
     updated = laboratory.updated(exact, visit(points=2, orientations=6, seed=5).measured())
     effects = (encoder_scales(10.0),)

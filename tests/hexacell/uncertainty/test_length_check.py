@@ -179,9 +179,7 @@ def test_gauges_that_are_zeroed_in_between_do_not_close(laboratory, exact, paper
 
 
 @pytest.mark.parametrize(("axis", "reversed_gauges"), [("z", [0, 1]), ("x", [1, 2])])
-def test_gauges_the_wrong_way_round_run_against_the_ball(
-    laboratory, exact, paper, axis, reversed_gauges
-) -> None:
+def test_gauges_the_wrong_way_round_run_against_the_ball(laboratory, exact, paper, axis, reversed_gauges):
     turned = Rotation.from_euler(axis, 180.0, degrees=True)
     check = noisy_check(laboratory, exact, paper, seats(turned=turned))
     assert check.agreement.probability < 1e-6
@@ -242,9 +240,7 @@ def test_what_a_measured_scale_does_at_the_task_is_known(laboratory, paper, name
     assert after.errors_of(nothing).estimated[:, :3] == pytest.approx(true[:, :3], abs=0.01)
 
 
-def test_what_the_check_shares_with_the_estimate_is_not_counted_as_independent(
-    laboratory, exact, paper
-) -> None:
+def test_what_the_check_shares_with_the_estimate_is_not_counted_as_independent(laboratory, exact, paper):
     """Linear draws of every cause: the error at the task less what is stated, against the budget's."""
     effects = (common_encoder_scale(30.0), encoder_scales(50.0))
     _, after, observed = measured_budget(laboratory, exact, ideal(paper), seats("oblique"), effects)

@@ -109,9 +109,7 @@ def test_an_effect_adds_the_chi_square_that_its_records_have(laboratory, propaga
     assert found.chi2 == pytest.approx(size**2 * propagation.chi_square(alone), rel=2 * SHARE)
 
 
-def test_a_gauge_that_reads_too_much_is_propagated_through_the_result_only(
-    laboratory, exact, propagation
-) -> None:
+def test_a_gauge_that_reads_too_much_is_propagated_through_the_result_only(laboratory, exact, propagation):
     records = laboratory.visits.measured().records
     changed = [_read(record, np.asarray(record.deviation) * [1.0, 1.001, 1.0]) for record in records]
     found = laboratory.identified(type(laboratory.visits.measured())(tuple(changed)))
@@ -121,9 +119,7 @@ def test_a_gauge_that_reads_too_much_is_propagated_through_the_result_only(
     assert propagation.columns(effect).direct.size == 0
 
 
-def test_an_ellipsoid_touched_by_three_plates_is_the_harmonic_of_its_axis(
-    laboratory, exact, propagation
-) -> None:
+def test_an_ellipsoid_touched_by_three_plates_is_the_harmonic_of_its_axis(laboratory, exact, propagation):
     half_axes = 10.0 + np.array([0.0, 0.0, 0.006])
     touched = np.swapaxes(laboratory.visits.rotations, 1, 2)
     heights = np.linalg.norm(half_axes[:, None] * touched, axis=1) - 10.0

@@ -11,9 +11,7 @@ from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion import paths
-from hexacell.motion import paths as route_module
 from hexacell.motion.trajectory import interpolate_line
-from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase
 from procedures.run.state import fold
 from procedures.steps import events
@@ -21,6 +19,7 @@ from procedures.steps.move import Move
 from procedures.workflow import sets as path_planning
 from procedures.workflow.points import IdentificationSteps
 from procedures.workflow.sets import NoSafePath
+from tests.procedures.runs.listening import happened
 from tests.procedures.story import located, next_step
 
 ELSEWHERE = (-60.0, 80.0, 520.0, 12.0, -8.0, 5.0)
@@ -35,7 +34,7 @@ def spy(monkeypatch: pytest.MonkeyPatch, *blocked: tuple[float, ...]) -> list[tu
         asked.append((start.pose(0), end.pose(0), reference))
         return not any(end.pose(0).as_tuple() == pytest.approx(pose) for pose in blocked)
 
-    monkeypatch.setattr(route_module, "is_clear", is_clear)
+    monkeypatch.setattr(paths, "is_clear", is_clear)
     return asked
 
 
@@ -52,7 +51,7 @@ def test_a_blocked_straight_line_is_replaced_by_a_route_over_a_waypoint(make_rig
     def only_from_level(_: Any, start: PoseBatch, end: PoseBatch, reference: Any = None) -> bool:
         return end.pose(0).as_tuple() != pytest.approx(blocked) or start.pose(0).a == pytest.approx(0.0)
 
-    monkeypatch.setattr(route_module, "is_clear", only_from_level)
+    monkeypatch.setattr(paths, "is_clear", only_from_level)
     step = next_step(rig.calibration, state)
     assert isinstance(step, Move)
     assert (step.key, step.pose) == ("P1/o00/move", (*ELSEWHERE[:3], 0.0, 0.0, 0.0))
@@ -62,9 +61,7 @@ def test_a_blocked_straight_line_is_replaced_by_a_route_over_a_waypoint(make_rig
     assert next_step(rig.calibration, after).key == "P1/o01/move"
 
 
-def test_a_return_to_the_reference_is_checked_against_the_travel(
-    recording, calibration, monkeypatch
-) -> None:
+def test_a_return_to_the_reference_is_checked_against_the_travel(recording, calibration, monkeypatch):
     sampled = recording.until(events.RecordTaken, count=5)
     here = sampled[-1].pose
     asked = spy(monkeypatch)
@@ -96,7 +93,7 @@ def test_visited_poses_serve_as_waypoints(recording, calibration, monkeypatch) -
         here, there = start.pose(0).as_tuple(), end.pose(0).as_tuple()
         return second.pose in (pytest.approx(here), pytest.approx(there))
 
-    monkeypatch.setattr(route_module, "is_clear", over_the_second)
+    monkeypatch.setattr(paths, "is_clear", over_the_second)
     step = next_step(calibration, state)
     assert (step.key, step.pose) == ("P1/o02/move", second.pose)
 
@@ -108,9 +105,7 @@ async def test_without_a_route_the_run_ends_without_moving(make_rig, monkeypatch
     with pytest.raises(NoSafePath):
         await rig.run(policy=policy)
     assert not any(entry.startswith("move") for entry in rig.controller.log)
-    assert [e.failure.value for e in read_journal(rig.folder.journal) if isinstance(e, events.Failed)] == [
-        "no_way"
-    ]
+    assert [one.failure.value for one in happened(rig, events.Failed)] == ["no_way"]
 
 
 ORIENTATIONS = 9

@@ -14,7 +14,7 @@ from procedures.journal.journal import read_journal
 from procedures.run.state import fold
 from procedures.steps import events
 from tests.procedures.rig import failure_without_record
-from tests.procedures.runs.listening import PowerCut, on
+from tests.procedures.runs.listening import PowerCut, happened, on
 
 
 @pytest.fixture
@@ -70,9 +70,7 @@ async def test_a_provisional_geometry_is_closer_to_the_truth_than_the_drawing(ri
 async def require_finished(rig: Any) -> None:
     ended = await rig.run()
     assert ended.exit_code == ExitCode.DONE
-    lent = [
-        e.geometry for e in read_journal(rig.folder.journal) if isinstance(e, events.ProvisionalApplied)
-    ]
+    lent = [event.geometry for event in happened(rig, events.ProvisionalApplied)]
     assert lent.count(lent[0]) == len(lent)
     assert kinds(rig)[-3:] == ["identified", "committed", "ended"]
     assert "taken back" in kinds(rig)

@@ -24,24 +24,14 @@ from tests.procedures.story import next_step
 POINTS, ORIENTATIONS, HELD_OUT = 2, 9, 3
 
 
-def test_a_chosen_pose_keeps_the_ball_inside_the_travel_and_gains_information(recording) -> None:
-    moves = [event.step for event in recording.history if isinstance(event, events.StepBegun)]
-    chosen = [step for step in moves if isinstance(step, Move) and step.expected]
-    assert len(chosen) == POINTS * (ORIENTATIONS - 1)
-    for step in chosen:
-        assert step.expected is not None
-        reach = np.abs(step.expected.deviation_mm) + 3.0 * np.array(step.expected.sigma_mm)
-        assert reach.max() <= 0.9 * 5.0
-        assert step.expected.gain > 0.0
-
-
-def test_measured_deviations_agree_with_the_expected_ones(recording) -> None:
-    """Expected and measured deviations differ by a few sigma at most, over the whole run."""
+def test_chosen_poses_gain_information_and_show_the_expected_deviations(recording) -> None:
     expected = {
         (event.step.at, event.step.orientation): event.step.expected
         for event in recording.history
         if isinstance(event, events.StepBegun) and isinstance(event.step, Move) and event.step.expected
     }
+    assert len(expected) == POINTS * (ORIENTATIONS - 1)
+    assert min(one.gain for one in expected.values()) > 0.0
     wrong_by = [
         np.abs(np.subtract(event.deviation_mm, expected[event.at, event.orientation].deviation_mm))
         / expected[event.at, event.orientation].sigma_mm

@@ -76,31 +76,23 @@ def refused_twice(told_of: Any) -> list[events.Event]:
     return [*verified_after_a_refusal(told_of), told_of.arrived(2), told_of.refused()]
 
 
+LATER = s(Phase.AFTER)
+MISSED = [*s().whole(2)[:-2], *[s().arrived(3), s().refused(3)] * (REFUSALS + 1)]
+FOUND_AGAIN = [*s().whole(3)[:-2], INTERRUPTED, LOCATED]
+
 Table = dict[str, tuple[list[events.Event], str | None]]
 TABLE: Table = {
     "nothing": ([], "P1/o01/move"),
     "zeroed": (s().whole(1)[:3], "P1/o02/move"),
     "refused there": ([*s().whole(1)[:3], s().arrived(2), s().refused()], "P1/o02/move"),
-    "refused too often": (
-        [*s().whole(2)[:-2], *[s().arrived(3), s().refused(3)] * (REFUSALS + 1)],
-        "P1/o01/move",
-    ),
-    "back after too many refusals": (
-        [*s().whole(2)[:-2], *[s().arrived(3), s().refused(3)] * (REFUSALS + 1), s().arrived(1)],
-        "P1/close",
-    ),
+    "refused too often": (MISSED, "P1/o01/move"),
+    "back after too many refusals": ([*MISSED, s().arrived(1)], "P1/close"),
     "closed with few records": (s().whole(1), "P2/o01/move"),
     "interrupted at a pose": ([s().arrived(), INTERRUPTED], "locate"),
     "found after an interruption": ([s().arrived(), INTERRUPTED, LOCATED], "P1/o01/move"),
-    "interrupted with records": ([*s().whole(3)[:-2], INTERRUPTED, LOCATED], "P1/o01/move"),
-    "back at the reference to see": (
-        [*s().whole(3)[:-2], INTERRUPTED, LOCATED, s().arrived()],
-        "P1/revisit",
-    ),
-    "seen to be as before": (
-        [*s().whole(3)[:-2], INTERRUPTED, LOCATED, s().arrived(), s().confirmed()],
-        "P1/o04/move",
-    ),
+    "interrupted with records": (FOUND_AGAIN, "P1/o01/move"),
+    "back at the reference to see": ([*FOUND_AGAIN, s().arrived()], "P1/revisit"),
+    "seen to be as before": ([*FOUND_AGAIN, s().arrived(), s().confirmed()], "P1/o04/move"),
     "the last record undone": ([*s().whole(3)[:-2], s().undone(3)], "P1/o03/sample"),
     "an earlier record undone": ([*s().whole(4)[:-2], s().undone(3)], "P1/o03/move"),
     "a record of a closed set undone": ([*MEASURED, s().undone(3)], "P1/o01/move"),
@@ -108,25 +100,13 @@ TABLE: Table = {
     "an earlier set voided": ([*MEASURED, s(Phase.IDENTIFY, 1).voided()], "P1/o01/move"),
     "taking it back was interrupted": ([*WRITTEN, WITHDRAWING, INTERRUPTED, LOCATED], "roll back"),
     "taken back without a verdict": ([*WRITTEN, WITHDRAWING, events.RolledBack()], "commit"),
-    "refused on the way afterwards": (
-        [*WRITTEN, *s(Phase.AFTER).whole(1)[:3], s(Phase.AFTER).refused(on_the_way=True)],
-        "locate",
-    ),
-    "refused at a pose afterwards": ([*WRITTEN, *refused_at_a_pose(s(Phase.AFTER))], "after-V1/o01/move"),
-    "back at the reference afterwards": (
-        [*WRITTEN, *refused_at_a_pose(s(Phase.AFTER)), s(Phase.AFTER).arrived(1)],
-        "after-V1/revisit",
-    ),
-    "taken again afterwards": ([*WRITTEN, *verified_after_a_refusal(s(Phase.AFTER))], "after-V1/o02/move"),
-    "refused twice afterwards": ([*WRITTEN, *refused_twice(s(Phase.AFTER))], "after-V1/o01/move"),
-    "back at the reference after two refusals": (
-        [*WRITTEN, *refused_twice(s(Phase.AFTER)), s(Phase.AFTER).arrived(1)],
-        "judge",
-    ),
-    "refused again on the way back": (
-        [*WRITTEN, *refused_at_a_pose(s(Phase.AFTER)), s(Phase.AFTER).refused(1), LOCATED],
-        "judge",
-    ),
+    "refused on the way later": ([*WRITTEN, *LATER.whole(1)[:3], LATER.refused(on_the_way=True)], "locate"),
+    "refused at a pose later": ([*WRITTEN, *refused_at_a_pose(LATER)], "after-V1/o01/move"),
+    "back after a refusal": ([*WRITTEN, *refused_at_a_pose(LATER), LATER.arrived(1)], "after-V1/revisit"),
+    "taken again later": ([*WRITTEN, *verified_after_a_refusal(LATER)], "after-V1/o02/move"),
+    "refused twice later": ([*WRITTEN, *refused_twice(LATER)], "after-V1/o01/move"),
+    "back after two refusals": ([*WRITTEN, *refused_twice(LATER), LATER.arrived(1)], "judge"),
+    "refused on the way back": ([*WRITTEN, *refused_at_a_pose(LATER), LATER.refused(1), LOCATED], "judge"),
     "passed": ([*AFTER, PASS], None),
     "worse": ([*AFTER, WORSE], "roll back"),
     "out of limits": ([*AFTER, OUT], "roll back"),

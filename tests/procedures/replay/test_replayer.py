@@ -24,7 +24,7 @@ from procedures.replay.replayer import Aspect, Replayer, ReplayReport, Scope
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import fold
 from procedures.steps import events
-from tests.procedures.runs.listening import at_step, cancelled, failing, on
+from tests.procedures.runs.listening import at_step, cancelled, failing, happened, on
 from tests.small_cell import changed
 
 Replay = Callable[..., ReplayReport]
@@ -166,11 +166,8 @@ def test_answers_of_a_person_are_repeated(recording, replayed, replay) -> None:
         asyncio.run(rig.run())
     rig.operator.name = "somebody else"
     asyncio.run(cancelled(rig, partial(on, events.Committed)))
-    history = read_journal(rig.folder.journal)
-    assert "somebody else" in {
-        event.approved_by for event in history if isinstance(event, events.Committed)
-    }
-    report = replay(history, rig, Scope.RESULTS)
+    assert "somebody else" in {event.approved_by for event in happened(rig, events.Committed)}
+    report = replay(read_journal(rig.folder.journal), rig, Scope.RESULTS)
     assert report.differences == []
 
 
@@ -200,9 +197,7 @@ MANIPULATIONS: list[tuple[type[Any], dict[str, Any], int, Scope, str]] = [
 
 
 @pytest.mark.parametrize(("kind", "changes", "nth", "scope", "field"), MANIPULATIONS)
-def test_a_manipulated_event_is_reported_with_its_line(
-    recording, replay, kind, changes, nth, scope, field
-) -> None:
+def test_a_manipulated_event_is_reported_with_its_line(recording, replay, kind, changes, nth, scope, field):
     history = altered(recording.history, kind, changes, nth)
     line = next(
         n for n, pair in enumerate(zip(history, recording.history, strict=True), 1) if pair[0] != pair[1]

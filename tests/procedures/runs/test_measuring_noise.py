@@ -258,7 +258,4 @@ async def test_a_run_that_visits_its_reference_hardly_ends_with_a_verdict(make_r
     await rig.run()
     assert len(happened(rig, events.NoiseMeasured)) == 1
     (judged,) = happened(rig, events.ResultValidated)
-    assert isinstance(judged, events.ResultValidated)
-    assert judged.verification is not None
-    assert judged.verification.accuracy is not None
     assert np.isfinite(judged.verification.accuracy.position.expanded)

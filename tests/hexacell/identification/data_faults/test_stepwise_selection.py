@@ -55,10 +55,9 @@ def test_unreachable_joint_variables_are_named(noisy, spoil, make_problem):
 
 def test_several_bad_records_are_all_named(noisy, spoil, make_problem):
     bad = {(1, 4): 0.4, (2, 2): -0.5, (3, 8): 1.0, (5, 5): 0.2}
-    measured = noisy
     for label, error in bad.items():
-        measured = spoil(measured, label, deviation=(0.0, error, 0.0))
-    found = identify(make_problem(measured))
+        noisy = spoil(noisy, label, deviation=(0.0, error, 0.0))
+    found = identify(make_problem(noisy))
     assert named(found) == set(bad)
     assert found.records == 55 - len(bad)
 
@@ -70,13 +69,12 @@ def test_a_scatter_of_twice_the_noise_is_no_outlier(noisy, spoil, make_problem):
 
 def test_no_more_than_a_tenth_is_ever_left_out(noisy, spoil, make_problem):
     """Where so many disagree, it is unknown which are right; the chi-square is too large."""
-    measured = noisy
     random = np.random.default_rng(0)
     for point in range(1, 6):
         for orientation in range(2, 6):
             error = random.uniform(-0.15, 0.15, 3)
-            measured = spoil(measured, (point, orientation), deviation=error)
-    found = identify(make_problem(measured))
+            noisy = spoil(noisy, (point, orientation), deviation=error)
+    found = identify(make_problem(noisy))
     assert len(found.left_out) <= 6
     assert found.records >= 49
     assert found.chi2 > 3 * found.dof

@@ -30,19 +30,14 @@ def with_noise(exact, encoder, gauge_mm, seed):
     return altered(exact.measured(), noisy)
 
 
-@pytest.fixture(scope="module")
-def levels_of(visit, make_problem):
-    def found(encoder, gauge_mm, seed=0, **how):
-        measured = with_noise(visit(seed=2, **how), encoder, gauge_mm, seed)
-        return levels_in(identify(make_problem(measured), find_outliers=False))
-
-    return found
-
-
 @pytest.mark.sample("0.005-0.02")
 @pytest.mark.parametrize(("encoder", "gauge_mm"), [(0.02, 0.01), (0.005, 0.02), (0.01, 0.01)])
-def test_levels_are_found_without_bias_and_with_their_standard_errors(levels_of, encoder, gauge_mm):
-    found = [levels_of(encoder, gauge_mm, seed) for seed in range(REPETITIONS)]
+def test_levels_are_found_without_bias_and_with_their_standard_errors(
+    visit, make_problem, encoder, gauge_mm
+):
+    exact = visit(seed=2)
+    measured = [with_noise(exact, encoder, gauge_mm, seed) for seed in range(REPETITIONS)]
+    found = [levels_in(identify(make_problem(each), find_outliers=False)) for each in measured]
     for true, levels in (
         (encoder, [one.encoder for one in found]),
         (gauge_mm, [one.gauge for one in found]),

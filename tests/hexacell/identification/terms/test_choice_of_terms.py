@@ -4,7 +4,7 @@ The machine is closed by the equations of the worlds, which owe nothing to the c
 """
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 
@@ -34,8 +34,6 @@ from tests.benchmarks.worlds.world import World
 SIZES = np.array([0.1, 0.06, 0.09, 0.05, 0.08, 0.07])
 TRUE = {"backlash": SIZES, "play": SIZES, "compliance": 3.0 * SIZES}
 """mm, mm, um/N."""
-
-Alteration = Callable[[MeasurementSet], MeasurementSet]
 
 
 @cache

@@ -28,9 +28,7 @@ def test_where_no_events_can_be_written_nothing_moves(typed_here, quick_cell, tm
     assert quick_cell.runs() == []
 
 
-def test_a_reader_that_leaves_does_not_end_the_run(
-    typed_here, quick_cell, few_candidates, tmp_path
-) -> None:
+def test_a_reader_that_leaves_does_not_end_the_run(typed_here, quick_cell, few_candidates, tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     quick_cell.edit(SHORT)

@@ -13,9 +13,7 @@ def share(cell, url: str, name: str) -> None:
     cell.write_text(f'{text}\n[archive]\nurl = "{url}"\n')
 
 
-def test_two_cells_on_two_computers(
-    typed_here, postgresql, demo, calibrated, cell_folder, monkeypatch
-) -> None:
+def test_two_cells_on_two_computers(typed_here, postgresql, demo, calibrated, cell_folder, monkeypatch):
     text = calibrated.read_text().replace("[acceptance]\n", "[acceptance]\nvalid_days = 30\n", 1)
     calibrated.write_text(text)
     share(calibrated, postgresql, "cell A")

@@ -5,8 +5,6 @@ import signal
 import tomllib
 from pathlib import Path
 
-import pytest
-
 CELL = "simulated-hexaglide.toml"
 CONTROLLER = "simulated-hexaglide.controller.toml"
 
@@ -16,14 +14,6 @@ def serving(start, folder):
     process = start("simulate", folder.cell)
     process.wait_for("serving", lambda: process.err)
     return process, process.out
-
-
-@pytest.fixture
-def served(start, quick_cell):
-    """The folder of a quick cell that another process serves; ``served.toml`` reaches it."""
-    process, text = serving(start, quick_cell)
-    (quick_cell.path / "served.toml").write_text(text)
-    return process, quick_cell.path / "served.toml"
 
 
 def test_simulate_prints_a_complete_cell_file_without_the_true_geometry(served_cell, typed_here):
@@ -62,9 +52,11 @@ def test_a_signal_ends_simulate_without_leftovers(start, cell_folder, typed_here
         assert port.startswith("/dev/pts/") or not Path(port).exists()
 
 
-def test_simulate_ends_while_a_run_is_connected(served, start):
+def test_simulate_ends_while_a_run_is_connected(quick_cell, start):
     """The run then reports which device is lost, and that it can be resumed."""
-    simulation, printed = served
+    simulation, text = serving(start, quick_cell)
+    printed = quick_cell.path / "served.toml"
+    printed.write_text(text)
     run = start("run", printed, "--mode", "check")
     run.wait_until(lambda: "journal" in names_below(printed.parent), "a journal")
     assert simulation.stopped(signal.SIGTERM).code == 0

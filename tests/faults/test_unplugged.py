@@ -61,15 +61,11 @@ class Puller:
         return False
 
 
-@pytest.fixture
-def puller(program: Any, new_site: Any, whole_with: Any) -> Puller:
-    return Puller(program, new_site, whole_with)
-
-
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("back", [True, False], ids=["put back", "left out"])
 @pytest.mark.parametrize("device", DEVICES)
-def test_any_device_unplugged_at_any_kind_of_step_is_handled(device, back, puller):
+def test_any_device_unplugged_at_any_kind_of_step_is_handled(device, back, program, new_site, whole_with):
+    puller = Puller(program, new_site, whole_with)
     for step in PULLED:
         puller.pull(device, step, back=back)

@@ -52,9 +52,7 @@ def compensating(installed: None, folder_of_nobody: Path) -> Iterator[LinuxCNC]:
     yield from _running("hexaglide", folder_of_nobody, with_backlash)
 
 
-async def test_joints_reach_the_same_place_from_either_side(
-    compensating: LinuxCNC, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_joints_reach_the_same_place_from_either_side(compensating, monkeypatch):
     for name, value in compensating.environment.items():
         monkeypatch.setenv(name, value)
     cell = load_cell(compensating.folder / "cell.toml")

@@ -80,9 +80,7 @@ def test_a_hexaglide_is_calibrated_and_its_geometry_runs(linuxcnc: LinuxCNC) -> 
 
 
 @pytest.mark.parametrize("is_short", [True, pytest.param(False, marks=pytest.mark.slow)])
-def test_a_stock_hexapod_is_calibrated_through_a_crash_of_linuxcnc(
-    hexapod: LinuxCNC, is_short: bool
-) -> None:
+def test_a_stock_hexapod_is_calibrated_through_a_crash_of_linuxcnc(hexapod, is_short):
     if is_short:
         shorten(hexapod)
     before = written(hexapod)

@@ -67,9 +67,7 @@ def in_its_folder(hexapod: LinuxCNC, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("hexapod", ["one file", TWO_FILES], indirect=True)
-async def test_other_zeros_are_read_by_a_restart_in_which_no_motor_moves(
-    hexapod, motors, in_its_folder
-) -> None:
+async def test_other_zeros_are_read_by_a_restart_in_which_no_motor_moves(hexapod, motors, in_its_folder):
     cell = load_cell(hexapod.folder / "cell.toml")
     paths, layout, mechanism = cell.config_paths, ConfigLayout.of(cell.settings), cell.settings.mechanism
     before = layout.read(*paths).geometry

@@ -46,9 +46,7 @@ def python(
 @pytest.mark.parametrize(
     ("package", "with_it"), [("counter_gauge", ()), ("scale_box", ("hexacell_scale_box_twin.py",))]
 )
-def test_its_own_suite_passes(
-    package: str, with_it: tuple[str, ...], installed: Callable[[str], Path], tmp_path: Path
-) -> None:
+def test_its_own_suite_passes(package, with_it, installed, tmp_path):
     """Run as its makers would, against what is installed."""
     ignored = shutil.ignore_patterns("hexacell_*")
     tests = shutil.copytree(HERE / package, tmp_path / "package", ignore=ignored)
@@ -74,9 +72,7 @@ def counted(tmp_path: Path) -> CellFolder:
     return cell
 
 
-def test_devices_finds_the_gauge_as_its_twin_serves_it(
-    installed: Callable[[str], Path], counted: CellFolder
-) -> None:
+def test_devices_finds_the_gauge_as_its_twin_serves_it(installed, counted):
     options = ("--diagnose", "x", "--cell", counted.cell, "--seconds", "0.2")
     watched = python("-m", "hexacell", "devices", *options, path=installed("counter_gauge"))
     assert watched.returncode == 0, watched.stderr
@@ -92,9 +88,7 @@ def test_a_cell_is_calibrated_with_the_gauge(installed: Callable[[str], Path], c
 
 
 @pytest.mark.slow
-def test_a_mechanism_is_calibrated_on_the_wire_in_its_own_words(
-    installed: Callable[[str], Path], tmp_path: Path
-) -> None:
+def test_a_mechanism_is_calibrated_on_the_wire_in_its_own_words(installed, tmp_path):
     with_it = installed("ring_mechanism")
     cell = shutil.copytree(HERE / "ring_mechanism/cells", tmp_path / "cells") / "ring.toml"
     refused = python("-m", "hexacell", "cell", "show", cell, path=None)

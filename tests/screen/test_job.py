@@ -37,7 +37,7 @@ from procedures.run.questions import (
 )
 from procedures.run.trips import Guard
 from procedures.steps import events
-from tests.screen.conftest import Opened, attended, settled
+from tests.screen.conftest import attended, settled
 from tests.screen.told_run import BEGUN, ToldRun, ToldWorkplace, snapshot
 from tests.waiting import until
 
@@ -146,9 +146,7 @@ async def test_a_long_change_leaves_in_sight_what_to_press(is_grave, cell, run, 
         assert pilot.app.screen.get_widget_at(last.region.x, last.region.bottom - 1)[0] is last
 
 
-async def test_motion_begins_on_an_explicit_yes_and_a_recovery_has_a_number(
-    cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
-) -> None:
+async def test_motion_begins_on_an_explicit_yes_and_a_recovery_has_a_number(cell, run, history, opened):
     async with opened(workplace_of(cell, run, history[:300])) as pilot:
         run.ask(ask_startup(StartupAction.SWITCH_ON, "the machine is off", is_theirs=False))
         await until_shown(pilot, "Is nobody within its reach? Switch the machine on?")
@@ -226,14 +224,7 @@ async def test_the_end_of_a_run_is_a_single_fault_and_it_is_not_shown_as_running
 @pytest.mark.parametrize(
     ("key", "keeps_running"), [("l", True), pytest.param("s", False, marks=pytest.mark.slow)]
 )
-async def test_quitting_asks_what_becomes_of_the_run(
-    key: str,
-    keeps_running: bool,
-    cell: Cell,
-    run: ToldRun,
-    history: tuple[events.Event, ...],
-    opened: Opened,
-) -> None:
+async def test_quitting_asks_what_becomes_of_the_run(key, keeps_running, cell, run, history, opened):
     async with opened(workplace_of(cell, run, history[:300])) as pilot:
         await until_shown(pilot, "point 5")
         await press(pilot, "q", "escape")

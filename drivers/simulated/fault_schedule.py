@@ -121,9 +121,10 @@ class FaultSchedule(Closeable):
         """Count a move, and schedule the faults that wait for it."""
         with self._lock:
             self.move_count += 1
+            now_s = self._clock.now()
             for fault in [fault for fault in self._waiting if fault.at_move == self.move_count]:
                 self._waiting.remove(fault)
-                self._enqueue(fault, self._clock.now())
+                self._enqueue(fault, now_s)
 
     def close(self) -> None:
         with self._lock:

@@ -171,11 +171,11 @@ def verify(settings: CellSettings, robot: Robot, found: Identification, held_out
         before_mm=before.mean_mm,
         after_mm=after.mean_mm,
         is_worse=worse,
-        is_better=is_worse(after, before, noise) or (not worse and errs_less(settings, robot, updated)),
+        is_better=is_worse(after, before, noise) or (not worse and _errs_less(settings, robot, updated)),
     )
 
 
-def errs_less(settings: CellSettings, robot: Robot, updated: Identification) -> bool:
+def _errs_less(settings: CellSettings, robot: Robot, updated: Identification) -> bool:
     """Whether the written geometry errs significantly less at the task poses than the one before it.
 
     By all records, which tell it where a few scattered deviations do not.

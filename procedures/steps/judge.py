@@ -115,7 +115,7 @@ def _length_measurements(settings: CellSettings, state: RunState) -> LengthMeasu
     """What was measured in the two seats, and the fixture's temperature if it has a thermometer."""
     samples, fixture = state.samples(Phase.LENGTH), settings.length_check
     shown = temperatures_shown(sample.reading for sample in samples)
-    celsius = shown.get((fixture and fixture.thermometer) or "")
+    celsius = shown.get(fixture.thermometer or "") if fixture else None
     records = MeasurementSet(tuple(sample.record for sample in samples))
     return LengthMeasurements(records, fmean(celsius) if celsius else None)
 

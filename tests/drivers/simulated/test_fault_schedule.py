@@ -69,7 +69,9 @@ def fault(device: str, **values: Any) -> SimulatedFault:
     return SimulatedFault.model_validate({"kind": "silent", "device": device, **values})
 
 
-def test_faults_are_injected_and_cleared_in_their_order(log) -> None:
+@pytest.mark.parametrize("speed", [100.0, 1e9], ids=["in time", "all due at once"])
+def test_faults_are_injected_and_cleared_in_their_order(log, speed: float) -> None:
+    log.clock = CellClock(speed)
     planned = [fault("b", after_s=4.0), fault("a", after_s=1.0, lasts_s=5.0)]
     with FaultSchedule(log, log.clock, planned):
         assert log.wait_for(3) == [("inject", "a"), ("inject", "b"), ("clear", "a")]

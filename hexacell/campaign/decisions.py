@@ -54,6 +54,9 @@ class Forecast(Frozen):
     """The predicted error at the worst task pose, 1 sigma, mm: now, after this record, at the end.
 
     Attributes:
+        now_mm: error by the records so far.
+        next_mm: error with the proposed record.
+        end_mm: error once everything that is still planned is measured.
         records: number of records still planned, the proposed one included, and the ``minutes`` of them.
         systematic_mm: standard uncertainty by the systematic effects there, at the end; None where it is
             not known.

@@ -39,10 +39,15 @@ LARGEST_FILE_BYTES = 5_000_000
 
 
 def read_measurements(path: Path, *, allow_partial: bool = False) -> MeasurementSet:
-    """Read a measurement file: the records in the order of the rows.
+    """Read a measurement file.
 
-    With ``allow_partial`` it may be the file of an unfinished calibration: without rows, or even without a
-    header, and with one row at a point.
+    Args:
+        path: the file, CSV.
+        allow_partial: accept the file of an unfinished calibration: without rows, or even without a header,
+            and with one row at a point.
+
+    Returns:
+        The records in the order of the rows: joints in mm or deg, deviations in mm, poses in mm and deg.
 
     Raises:
         FileError: the file cannot be read, a column is missing, a cell is not a number, a record occurs

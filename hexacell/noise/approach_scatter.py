@@ -112,8 +112,13 @@ def approach_scatter(
 ) -> RepeatedApproaches | None:
     """The scatter of visits of one pose; None with fewer than ``FEWEST_VISITS``.
 
-    They showed ``deviations`` of the ball along base x, y, z (m, 3), mm, and ``joints`` (m, 6). The noise
-    of each instrument in a record is stated as ``encoders`` (6,) and ``gauges_mm`` (3,).
+    Args:
+        deviations: of the ball along base x, y, z (m, 3), mm.
+        joints: what the encoders showed (m, 6), mm.
+        ball: how it moves by what the encoders show.
+        encoders: stated noise of each encoder (6,) in a record.
+        gauges_mm: likewise of the gauges (3,).
+        joint_unit: of the joint variables.
     """
     if len(deviations) < FEWEST_VISITS:
         return None

@@ -65,10 +65,16 @@ class Revisit:
 
 
 def reversal_of(visits: Sequence[Revisit], known: Array, sigma: Array, unit: JointUnit) -> Reversal | None:
-    """Reversal and repeatability, those of the ball at the pose of the first visits; None of too few.
+    """Reversal and repeatability; those of the ball are at the pose of the first visits.
 
-    ``known`` is what is known beforehand of the reversal value of each joint (6,), in the ``unit`` of the
-    joint variables, with one standard deviation ``sigma`` (6,).
+    Args:
+        visits: pairs of them.
+        known: what is known beforehand of the reversal value of each joint (6,).
+        sigma: one standard deviation of that (6,).
+        unit: of the joint variables.
+
+    Returns:
+        None of too few visits.
     """
     if len(visits) < FEWEST_CHANGES:
         return None

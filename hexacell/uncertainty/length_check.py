@@ -71,7 +71,15 @@ class LengthCheck:
         judged: JudgedGeometry,
         effects: Iterable[Effect] = (),
     ) -> LengthCheck:
-        """The check of the geometry of n records; of the effects the common scale does not count."""
+        """The check of a geometry.
+
+        Args:
+            records: n of them, with the geometry that is judged.
+            standard: the fixture.
+            noise: of the readings, and of the gauges' alignment.
+            judged: what is known of that geometry.
+            effects: that the machine may have; the scale common to all encoders does not count.
+        """
         placement = records.placement
         mechanism, geometry = placement.mechanism, placement.geometry
         found = pose_sensitivity(mechanism, geometry, placement.poses, placement.joints, POSITION)

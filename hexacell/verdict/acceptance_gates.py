@@ -35,10 +35,11 @@ def gates(
     """All gates of an identification.
 
     Args:
-        identified: the geometry.
+        identified: the geometry, in the mechanism's frame convention.
         violations: of the drawing's tolerances.
         residuals: the chi-square test of the residuals.
-        change_mm: the largest change of a parameter, in the best choice of frames.
+        change_mm: the largest change of a parameter of the controller's, in the best choice of frames:
+            other frames are no other robot.
         largest_change_mm: what may change without a person.
         expired: instruments whose certificate had expired when the run began; None without certificates.
         impossible: coefficients of what is not geometry that no machine has (:func:`impossible_terms`).

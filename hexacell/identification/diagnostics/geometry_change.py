@@ -20,10 +20,16 @@ STEPS = 5
 def largest_change(
     mechanism: Mechanism, before: Geometry, geometry: Geometry, tolerances: Tolerances
 ) -> float:
-    """The largest change of a parameter from one geometry, in its own frames, to another in the convention.
+    """The largest change of a parameter from one geometry to another, in the best choice of frames.
 
-    In the best choice of frames, by the tolerances; in mm, or mrad of an angle; infinite where the other
-    geometry is not a number.
+    Args:
+        mechanism: of both.
+        before: in its own frames.
+        geometry: in the mechanism's frame convention.
+        tolerances: what changes of different parameters are compared by.
+
+    Returns:
+        mm, or mrad of an angle; infinite where the geometry is not a number.
     """
     if not np.isfinite(geometry.vector).all():
         return float("inf")

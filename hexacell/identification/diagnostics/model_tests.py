@@ -30,9 +30,14 @@ class PointPrediction:
 
 
 def update(found: Identification, further: Problem) -> Identification:
-    """Estimate by the records of an identification and ``further`` ones at other points, with one prior.
+    """Estimate by the records of an identification and further ones.
 
-    The prior counts where it was not released before. The estimate is by all records with a pose under it.
+    Args:
+        found: the identification; its prior, where it was not released, counts again.
+        further: records at other points, with the same prior.
+
+    Returns:
+        The estimate by all records that have a pose under it.
 
     Raises:
         IdentifiabilityError: no geometry fits any of the further records; they would prove nothing.

@@ -50,9 +50,15 @@ class Accuracy:
 
 
 def predicted_accuracy(belief: RobotBelief, *, task: PoseBatch, workspace: PoseBatch) -> Accuracy | None:
-    """Predict the accuracy at task poses, with base and platform frames fitted over the workspace poses.
+    """Predict the accuracy at task poses.
 
-    Both are in the mechanism's frame convention. None if none of one of them is reachable.
+    Args:
+        belief: the estimate beside the geometry that the controller commands with.
+        task: t poses, in the mechanism's frame convention.
+        workspace: poses over which base and platform frames are fitted.
+
+    Returns:
+        Errors in mm and rad; None if no task pose or no workspace pose is reachable.
     """
     reached, task_reachable = _reached(belief, task)
     reached_workspace, workspace_reachable = _reached(belief, workspace)
@@ -78,9 +84,15 @@ def predicted_accuracy(belief: RobotBelief, *, task: PoseBatch, workspace: PoseB
 
 
 def error_jacobian(belief: RobotBelief, task: PoseBatch, workspace: PoseBatch) -> Array:
-    """Derivatives (n, 6, p), mm and rad by mm, of the errors at n task poses by the free parameters.
+    """Derivatives of the errors at task poses by the free parameters of the estimate.
 
-    The estimated robot reaches these poses, and those of the workspace over which the frames are fitted.
+    Args:
+        belief: the estimate, with p free parameters.
+        task: n poses that the estimated robot reaches.
+        workspace: poses that it reaches, over which the frames are fitted.
+
+    Returns:
+        (n, 6, p), mm and rad by mm.
     """
     poses = PoseBatch.joined([task, workspace])
     joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)

@@ -89,7 +89,10 @@ class Noise:
         return np.asarray(scaled @ np.swapaxes(scaled, -1, -2))
 
     def chance_covariance(self, position_by_joints: Array) -> Array:
-        """Covariance (n, 3, 3), mm^2, of what the gauges show at a commanded pose: by stops and noise."""
+        """Covariance (n, 3, 3), mm^2, of what the gauges show at a commanded pose, by ``dP/dq`` (n, 3, 6).
+
+        By where the joints stop, whether their encoders see it or not, and by the gauges' noise.
+        """
         return self.stop_covariance(position_by_joints) + self.record_covariance(position_by_joints)
 
     def stop_covariance(self, position_by_joints: Array) -> Array:

@@ -19,10 +19,15 @@ TRIAL = 4
 
 
 def walk_columns(first_rows: NDArray[np.intp], records: int, step_mm: float) -> Array:
-    """What one standard deviation of each increment does to n records (n, 3, 3 (n - m)), mm.
+    """What one standard deviation of each increment does to each record.
 
-    At ``first_rows`` (m,) each point begins, of records in the order in which they were taken; ``step_mm``
-    is one standard deviation along each axis from one reading to the next.
+    Args:
+        first_rows: (m,) row at which each point begins, of records in the order in which they were taken.
+        records: their number n.
+        step_mm: one standard deviation along each axis from one reading to the next.
+
+    Returns:
+        (n, 3, 3 (n - m)), mm.
     """
     rows = np.arange(records)
     later = np.setdiff1d(rows, first_rows)

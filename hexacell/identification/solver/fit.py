@@ -107,10 +107,15 @@ FINE = SolverOptions(SMALL_DAMPING, FINAL_STEP_MM)
 def fit_regularized(
     problem: Problem, options: SolverOptions = COARSE, start: Array | None = None
 ) -> Identification:
-    """Fit the records that can be used with the prior, and release it where the data determine parameters.
+    """Fit the records with the prior, and release it where the data determine the parameters.
 
-    The solver starts at the problem's parameters, or at others (p,), mm; ``options`` are for the first of
-    two solutions.
+    Args:
+        problem: the records, and the parameters and poses at which the solver starts.
+        options: for the first of the two solutions.
+        start: free parameters (p,), mm, at which the solver starts instead.
+
+    Returns:
+        The fit of the records that could be used.
     """
     kept, first = solve_around_singularities(problem, problem.prior.precision, options, start)
     # Residuals below the stated noise justify more information than stated: without it, a prior would bias
@@ -130,10 +135,16 @@ def fit_regularized(
 def solve_around_singularities(
     problem: Problem, precision: Array, options: SolverOptions, start: Array | None = None
 ) -> tuple[Problem, Solution]:
-    """Minimize the cost without records that have no start pose or come next to a singularity.
+    """Minimize the cost without records that come next to a singularity.
 
-    The prior has a ``precision`` (p, p), 1/mm^2; the start are the problem's parameters or others (p,), mm.
-    Returns the records that were used, and their solution.
+    Args:
+        problem: n records, some of which may have no start pose.
+        precision: (p, p) of the prior, 1/mm^2.
+        options: of the solver.
+        start: free parameters (p,), mm, if not those of the problem.
+
+    Returns:
+        The records that were used, and their solution.
     """
     if start is not None:
         problem = problem.started_at(start)
@@ -174,9 +185,16 @@ def _restorable(problem: Problem, geometry: Geometry, aside: Mask) -> tuple[Mask
 
 
 def solve(problem: Problem, precision: Array, start: Prediction, options: SolverOptions) -> Solution:
-    """Minimize the cost from the model at some parameters; the last iterate, and why it is the last.
+    """Minimize the cost from some free parameters and the poses that close their geometry.
 
-    ``precision`` (p, p), 1/mm^2, is that of the prior; zero for no prior.
+    Args:
+        problem: the n records and the prior's centre.
+        precision: (p, p) of the prior, 1/mm^2; zero for no prior.
+        start: the model of the records at these parameters.
+        options: of the solver.
+
+    Returns:
+        The last iterate, and why the iteration ended there.
     """
     now = _Iterate.at(problem, precision, start, options.damping)
     iterations, ended = 0, None

@@ -283,7 +283,9 @@ class Identification:
     def log_marginal_likelihood(self) -> float:
         """Logarithm of the likelihood of the records under the prior of their problem, but for a constant.
 
-        The integral over the parameters is Laplace's approximation at the estimate.
+        The integral over the parameters is Laplace's approximation at the estimate: half the sum of the
+        squared residuals, the squared distance from the prior's centre, and ``log det(1 + C I)`` with the
+        prior's covariance C and the information I of the records, all with a minus sign.
         """
         prior, information = self.problem.prior, self.solution.information
         squares = self.chi2 + prior.squared_distance(self.free)

@@ -34,7 +34,14 @@ class TermEstimates:
     def at(
         cls, problem: Problem, taken: TakenTerms, prediction: Prediction, covariance: Array
     ) -> TermEstimates:
-        """The best coefficients at a minimum, where the free parameters have a covariance (p, p), mm^2."""
+        """The best coefficients at a minimum of the cost.
+
+        Args:
+            problem: the records.
+            taken: the terms that they have.
+            prediction: of the records at the minimum.
+            covariance: of the free parameters there (p, p), mm^2.
+        """
         elimination = NuisanceElimination(problem, prediction.weights)
         causes = taken.columns.shape[-1]
         values = elimination.common(prediction.residuals[..., None])[-causes:, 0]

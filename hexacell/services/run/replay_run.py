@@ -29,7 +29,7 @@ async def replay(run: Path, scope: Scope = Scope.ALL, tolerance: float = TOLERAN
     """Put a recorded run, by its folder or journal, through the procedure again and compare.
 
     ``tolerance`` is the allowed difference of a number, in its unit; relative above 1. Raises
-    ``FileError``.
+    ``FileError`` if the journal, or the cell file in it, cannot be read.
     """
     is_folder = await asyncio.to_thread(run.is_dir)
     folder = RunFolder(run if is_folder else run.parent)

@@ -4,11 +4,15 @@
 
 Where the value is a variable of the INI file (``[GENHEXKINS]BASE0X``), that is the config.
 :mod:`~hexacell.config.linuxcnc_legs` says which pins may be beside those of the geometry.
+
+halcmd joins a line that ends with a backslash to the next one before it looks for a comment, and takes
+``PIN = VALUE`` for ``setp PIN VALUE`` (``halcmd_main.c``, ``halcmd.c``). Before a carriage return the
+backslash joins nothing.
 """
 
 import re
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -23,8 +27,13 @@ from hexacell.config.linuxcnc_legs import LegCorrections
 from hexacell.errors import FileError
 from hexacell.kinematics.parameters import GeometricParameter, ParameterSet
 
-SETP = re.compile(r"[ \t]*setp[ \t]+(?P<pin>\S+)[ \t]+(?P<value>\S+)[ \t]*(?:#.*)?\r?")
-"""A line that sets a pin."""
+_JOIN = "\\\n"
+_LINE = re.compile(
+    r"""(?P<code>(?:\\\n|[^#"'\n]|"(?:\\\n|[^"\n])*"|'(?:\\\n|[^'\n])*')*)"""
+    r"(?P<comment>(?:\\\n|[^\n])*)(?:\n|\Z)"
+)
+_WORD = re.compile(r"(?!\\\n)\S(?:(?:\\\n)*(?!\\\n)\S)*")
+_SWALLOWED = re.compile(r"\n[ \t]*(?:setp[ \t]|\S+[ \t]+=[ \t])")
 
 VARIABLE = "["
 """Begins a variable of the INI file: ``[SECTION]NAME``."""
@@ -89,13 +98,54 @@ class HalText:
         """Whether a line sets a pin to a number: to a variable of the INI file, it is that which has it."""
         return any(not token.text.startswith(VARIABLE) for token in self._tokens.get(key, ()))
 
+    @property
+    def pins(self) -> Iterator[tuple[str, NumberToken]]:
+        """Each pin that is set, with what it is set to, in the order of the text.
+
+        Raises:
+            FileError: a command is not one pin and one value, or is in a comment that goes on.
+        """
+        for words in self.commands:
+            is_assignment = len(words) == 3 and words[1].text == "="
+            if words[0].text != "setp" and not is_assignment:
+                continue
+            value = words[-1]
+            is_cut = len(value.text) != value.end - value.start or value.text.endswith("\\")
+            if len(words) != 3 or is_cut:
+                problem = "this command does not set one pin to one value within a line"
+                action = "Write setp PIN VALUE; only a backslash right before the line feed goes on"
+                raise token_error(words[0], problem, self.source, action)
+            yield words[0 if is_assignment else 1].text, value
+
+    @property
+    def commands(self) -> Iterator[tuple[NumberToken, ...]]:
+        """The words of each command, as halcmd sees them.
+
+        Raises:
+            FileError: a command that sets a pin is in a comment that goes on in its line.
+        """
+        number = 1
+        for line in _LINE.finditer(self.text):
+            start, code = line.span("code")
+            words = tuple(
+                NumberToken(
+                    word[0].replace(_JOIN, ""),
+                    *word.span(),
+                    number + self.text.count("\n", start, word.start()),
+                )
+                for word in _WORD.finditer(self.text, start, code)
+            )
+            if swallowed := _SWALLOWED.search(self.text, code, line.end()):
+                problem = "LinuxCNC does not see this command: the comment before it ends with a backslash"
+                at = number + self.text.count("\n", start, swallowed.start() + 1)
+                raise FileError(problem, subject=self.source, line=at, action="Remove the backslash")
+            if words:
+                yield words
+            number += line[0].count("\n")
+
     @cached_property
     def _tokens(self) -> Mapping[str, list[NumberToken]]:
         found: defaultdict[str, list[NumberToken]] = defaultdict(list)
-        start = 0
-        for line, content in enumerate(self.text.split("\n"), start=1):
-            if setp := SETP.fullmatch(content):
-                first, end = (start + place for place in setp.span("value"))
-                found[setp["pin"]].append(NumberToken(setp["value"], first, end, line))
-            start += len(content) + 1
+        for pin, value in self.pins:
+            found[pin].append(value)
         return found

@@ -15,8 +15,9 @@ much away while it moves down, and keeps it while the joint stands; what it repo
 
 LinuxCNC looks for a variable in the first section of that name alone and takes the first one there; names
 are case-sensitive; what stands behind the number belongs to the value, comments too; a backslash at the end
-of a line, even of a comment, makes the next one a part of it (seen with ``inivar`` of LinuxCNC 2.9). What
-LinuxCNC would not see, or see otherwise than a person, is refused.
+of a line, even of a comment, makes the next one a part of it (seen with ``inivar`` of LinuxCNC 2.9). 2.10
+also ignores blanks behind that backslash, a carriage return among them, and blanks within the brackets of a
+section (``inifile.cc``). What one of them would not see, or see otherwise than a person, is refused.
 """
 
 import re
@@ -32,6 +33,7 @@ from hexacell.cell.fields import LARGEST_NUMBER, Text
 from hexacell.config.interface import (
     LARGEST_BACKLASH,
     LARGEST_CONFIG_BYTES,
+    NUMBER,
     ConfigPart,
     ControllerLimits,
     NumberToken,
@@ -103,12 +105,13 @@ SEPARATOR = "/"
 """Between a section and a variable in a key; without it the variable is in the section of the options."""
 
 CONTINUED = "\\"
-"""At the end of a line; before a carriage return LinuxCNC takes it for a part of the value."""
+"""At the end of a line; before blanks LinuxCNC 2.9 takes it for a part of the value."""
 
 _CONTINUATION = "the line before ends with a backslash and goes on in this one", "Remove the backslash"
 _SECOND_SECTION = "it does not look into a second section of that name", "Move it to the first one"
 
 _UNCLOSED = "the line that begins its section has no ']'", "Close it"
+_BLANKS = "its section has blanks within the brackets", "Remove them"
 
 # A line that begins with "[" ends the section before it, closed or not.
 _SECTION = re.compile(r"[ \t]*\[(?P<name>[^\]\n]*)(?P<close>\])?")
@@ -116,6 +119,7 @@ _SECTION = re.compile(r"[ \t]*\[(?P<name>[^\]\n]*)(?P<close>\])?")
 _VARIABLE = re.compile(
     r"[ \t]*(?P<name>[^=\s#;\[][^=\s]*)(?:[ \t][^=\n]*)?(?:=[ \t]*(?P<value>.*?))?[ \t\r]*(?:\n|\Z)"
 )
+_INCLUDE = re.compile(r"(?m)^#INCLUDE[ \t]+(.*?)[ \t\r]*$")
 _NUMBER_AND_MORE = re.compile(r"(?P<number>[-+.\deE]+)[ \t]+(?P<more>.+)")
 
 
@@ -178,7 +182,7 @@ class IniText:
             if one.section == section and one.hidden is None
         ]
         # A line that ends with a backslash would swallow the next one.
-        places = [first for first in lines if not first.endswith((CONTINUED, f"{CONTINUED}\n"))]
+        places = [first for first in lines if not first.rstrip().endswith(CONTINUED)]
         if not places:
             raise FileError(f"there is no section [{section}]", subject=self.source, action="Add it")
         first, end = places[-1], "\r\n" if "\r\n" in self.text else "\n"
@@ -204,17 +208,22 @@ class IniText:
         hidden_by_header: tuple[str, str] | None = None
         is_continued = False
         for line, content in enumerate(self.text.split("\n"), start=1):
-            was_continued, is_continued = is_continued, content.endswith(CONTINUED)
+            was_continued, is_continued = is_continued, content.rstrip(" \t\r").endswith(CONTINUED)
             if variable := _VARIABLE.fullmatch(content):
                 group = "value" if variable["value"] is not None else "name"
                 first, end = (start + place for place in variable.span(group))
                 token = NumberToken(variable[group], first, end, line)
                 hidden = _CONTINUATION if was_continued else hidden_by_header
                 yield _Variable(section, variable["name"], token, hidden)
-            elif (header := _SECTION.match(content)) and not was_continued:
-                section, hidden_by_header = header["name"], _SECOND_SECTION
+            elif header := _SECTION.match(content):
+                if was_continued:
+                    problem = f"LinuxCNC may not see this section: {_CONTINUATION[0]}"
+                    raise FileError(problem, subject=self.source, line=line, action="Remove the backslash")
+                section, hidden_by_header = header["name"].strip(), _SECOND_SECTION
                 if header["close"] is None:
-                    section, hidden_by_header = section.strip(), _UNCLOSED
+                    hidden_by_header = _UNCLOSED
+                elif section != header["name"]:
+                    hidden_by_header = _BLANKS
                 elif section not in seen:
                     hidden_by_header = None
                     seen.add(section)
@@ -251,26 +260,34 @@ def _with_backlash(ini: IniText, joint: str, unit_mm: float, wanted: float) -> s
 
 
 ROTARY_JOINT = "ANGULAR"
+LIMITS = {"MIN_LIMIT": -1.0, "MAX_LIMIT": 1.0}
+UNLIMITED: Range = (-LARGEST_NUMBER, LARGEST_NUMBER)
 
 
 def limits_of_ini(path: Path, unit_mm: float = 1.0) -> ControllerLimits:
-    """The limits in an INI file, in mm and deg; None for axes and joints that are not all there.
+    """The limits in an INI file and in those that it includes, in mm and deg; None where none is stated.
 
     ``unit_mm`` is one unit of length of the machine; angles are in degrees on every machine.
 
     Raises:
         FileError: the file cannot be read, or a limit is no number, or not above the other.
     """
-    return limits_in(IniText(atomic_files.read_text(path, LARGEST_CONFIG_BYTES), path, ""), unit_mm)
+    text = atomic_files.read_text(path, LARGEST_CONFIG_BYTES)
+    found = limits_in(IniText(text, path, ""), unit_mm)
+    for included in (path.parent / name for name in _INCLUDE.findall(text)):
+        if included.is_file():
+            more = IniText(atomic_files.read_text(included, LARGEST_CONFIG_BYTES), included, "")
+            found = found.narrowed(limits_in(more, unit_mm))
+    return found
 
 
 def limits_in(ini: IniText, unit_mm: float) -> ControllerLimits:
-    """The limits in a text."""
+    """The limits in a text; an absent one LinuxCNC takes for none."""
     joints = [_range(ini, section, 1.0 if _turns(ini, section) else unit_mm) for section in JOINTS]
     axes = [_range(ini, f"AXIS_{axis}", unit_mm if axis in "XYZ" else 1.0) for axis in "XYZABC"]
-    stated = [one for one in joints if one is not None]
     return ControllerLimits(
-        joints=tuple(stated) if len(stated) == LEGS else None, axes=tuple(axes) if any(axes) else None
+        joints=tuple(one or UNLIMITED for one in joints) if any(joints) else None,
+        axes=tuple(axes) if any(axes) else None,
     )
 
 
@@ -281,21 +298,24 @@ def _turns(ini: IniText, joint: str) -> bool:
 
 
 def _range(ini: IniText, section: str, unit: float) -> Range | None:
-    """Both limits of a joint or an axis; LinuxCNC takes an absent one for unlimited."""
-    low, high = (_limit(ini, f"{section}/{name}") for name in ("MIN_LIMIT", "MAX_LIMIT"))
+    """Both limits of a joint or an axis; None if it has none."""
+    low, high = (_limit(ini, f"{section}/{name}", sign) for name, sign in LIMITS.items())
     if low is None and high is None:
         return None
-    lowest = -LARGEST_NUMBER if low is None else unit * low.value
-    highest = LARGEST_NUMBER if high is None else unit * high.value
+    lowest = UNLIMITED[0] if low is None else max(UNLIMITED[0], unit * low.value)
+    highest = UNLIMITED[1] if high is None else min(UNLIMITED[1], unit * high.value)
     if low is not None and high is not None and lowest >= highest:
         problem = f"MAX_LIMIT of [{section}] is not above its MIN_LIMIT, {low.text}"
         raise token_error(high, problem, ini.source, "Correct one of them")
     return lowest, highest
 
 
-def _limit(ini: IniText, key: str) -> NumberToken | None:
+def _limit(ini: IniText, key: str, sign: float) -> NumberToken | None:
     if not ini.has(key):
         return None
     token = ini.number(key)
+    # LinuxCNC's own defaults are -1e99 and 1e99 (emccfg.h).
+    if re.fullmatch(NUMBER, token.text, re.ASCII) and sign * float(token.text) >= LARGEST_NUMBER:
+        return None
     number_of(token, ini.source)
     return token

@@ -64,7 +64,7 @@ def compiled(ini: str, folder: Path) -> ctypes.CDLL:
     if shutil.which("cc") is None:
         pytest.skip("there is no C compiler here")
     set_pins = _wanted([FOLDER / "hexaglide.hal"], [IniText(ini, None, "")])
-    pins = {pin.removeprefix("hexaglidekins."): number for pin, number in set_pins}
+    pins = {pin.removeprefix("hexaglidekins."): number for pin, number in set_pins.items()}
     head, code = (FOLDER / "hexaglidekins.comp").read_text().split("\n;;\n")
     source, library = folder / "kinematics.c", folder / "kinematics.so"
     text = STUBS

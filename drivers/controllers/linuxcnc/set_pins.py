@@ -3,7 +3,8 @@
     hexacell-set-pins hexaglide.hal geometry.inc
 
 sets every pin again that a ``setp`` line of the HAL files sets to a variable of the INI files; if none is
-named, every pin that such a line sets to a number. Other pins stay as they were tuned at run time.
+named, every pin that such a line sets to a number. Other pins stay as they were tuned at run time. Where it
+cannot tell which number a pin is to have, nothing is set.
 
 It is the ``reload_command`` of a cell: the machine must be off, since with the machine on a new geometry
 makes the joints jump (by 6.8 mm at 3.4 m/s in a trial).
@@ -16,12 +17,14 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 
-from hexacell.config.linuxcnc_hal import SETP
+from hexacell.config.interface import NumberToken, token_error
+from hexacell.config.linuxcnc_hal import HalText
 from hexacell.config.linuxcnc_ini import IniText
-from hexacell.errors import HexacellError, UsageError
+from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.storage.atomic_files import read_text
 
 KINEMATICS_CYCLES_S = 0.1
@@ -30,8 +33,11 @@ KINEMATICS_CYCLES_S = 0.1
 TIMEOUT_S = 10.0
 FAILURE_PINS = "*fwd-kins-fail"
 
-_REFERENCE = re.compile(r"\[(?P<section>[^\]]+)\](?P<name>\S+)")
-_SHOWN = re.compile(r"\s*\S+\s+(?:float|bit|s32|u32)\s+\S+\s+(?P<value>\S+)\s+(?P<pin>\S+)")
+_VARIABLE = re.compile(r"\[(?P<section>[^\]]+)\](?:(?P<name>[\w.-]+)|\((?P<round>[^)]+)\))", re.ASCII)
+_PUT_TOGETHER = re.compile(r"[\[$\"']")
+"""In a word of which halcmd replaces a part."""
+
+_SHOWN = re.compile(r"\s*\S+\s+(?:float|bit|[su](?:32|64))\s+\S+\s+(?P<value>\S+)\s+(?P<pin>\S+)")
 
 
 def main() -> int:
@@ -51,7 +57,8 @@ def set_pins(files: Sequence[Path], settle_s: float = KINEMATICS_CYCLES_S) -> in
     After ``settle_s`` the forward kinematics has been computed with them.
 
     Raises:
-        FileError: a file cannot be read, or has a section that a pin names, and not its variable.
+        FileError: a file cannot be read, has a section that a pin names, and not its variable, or a line
+            that is not understood and may set a pin; or no line uses a section of it.
         UsageError: there is no HAL file or no pin in it, LinuxCNC does not run here, or has no such pin; or
             its forward kinematics fails with these numbers.
     """
@@ -59,7 +66,7 @@ def set_pins(files: Sequence[Path], settle_s: float = KINEMATICS_CYCLES_S) -> in
     if not hal:
         raise UsageError("no HAL file is named", action="hexacell-set-pins FILE.hal ... [FILE.ini ...]")
     inis = [path for path in files if path not in hal]
-    wanted = dict(_wanted(hal, [IniText(read_text(path), path, "") for path in inis]))
+    wanted = _wanted(hal, [IniText(read_text(path), path, "") for path in inis])
     if not wanted:
         raise UsageError(
             "the HAL files set no pin to a number, or to a variable of these INI files",
@@ -73,7 +80,13 @@ def set_pins(files: Sequence[Path], settle_s: float = KINEMATICS_CYCLES_S) -> in
         )
     # LinuxCNC shows seven digits of them, which is enough to go back while the machine is off.
     before = {pin: shown[pin] for pin in wanted}
-    _set(wanted)
+    try:
+        _set(wanted)
+    except UsageError:
+        # halcmd ends at the first pin that it cannot set, so this sets those before it again.
+        with suppress(UsageError):
+            _set(before)
+        raise
     time.sleep(settle_s)
     if failing := [pin for pin, value in _shown(FAILURE_PINS).items() if value == "TRUE"]:
         _set(before)
@@ -84,21 +97,65 @@ def set_pins(files: Sequence[Path], settle_s: float = KINEMATICS_CYCLES_S) -> in
     return len(wanted)
 
 
-def _wanted(hal: Iterable[Path], inis: Sequence[IniText]) -> Iterator[tuple[str, str]]:
+def _wanted(hal: Sequence[Path], inis: Sequence[IniText]) -> Mapping[str, str]:
     """Every pin with its value as text; of INI variables, those of sections that the INI files have.
 
     Where there are INI files, they have the geometry, and a number in the HAL file is not part of it.
     """
-    for path in hal:
-        for line in read_text(path).split("\n"):
-            if setp := SETP.fullmatch(line):
-                reference = _REFERENCE.fullmatch(setp["value"])
-                if reference is None:
-                    if not inis:
-                        yield setp["pin"], setp["value"]
-                elif with_it := [ini for ini in inis if ini.has_section(reference["section"])]:
-                    number = with_it[0].number(f"{reference['section']}/{reference['name']}")
-                    yield setp["pin"], number.text
+    wanted, others, used = dict[str, str](), set[str](), set[Path | None]()
+    for text in (HalText(read_text(path), path) for path in hal):
+        _require_no_other_way(text, hal, inis)
+        for pin, value in text.pins:
+            number = _filled(value, inis, text.source, used)
+            if pin in wanted or (number is not None and pin in others):
+                raise token_error(value, f"{pin} is set a second time", text.source, "Remove one")
+            if number is None:
+                others.add(pin)
+            else:
+                wanted[pin] = number
+    if unused := [ini.source for ini in inis if wanted and ini.source not in used]:
+        action = "Leave it out, or set its pins in a HAL file"
+        raise FileError("no line sets a pin to a variable of it", subject=unused[0], action=action)
+    return wanted
+
+
+def _filled(
+    value: NumberToken, inis: Sequence[IniText], source: Path | None, used: set[Path | None]
+) -> str | None:
+    """What a pin is to get, None if that is not part of the geometry; ``used`` gets the INI files of it."""
+    has_own = False
+
+    def variable(found: re.Match[str]) -> str:
+        nonlocal has_own
+        if (ini := _holder(found, inis)) is None:
+            return found[0]
+        has_own = True
+        used.add(ini.source)
+        return ini.number(f"{found['section']}/{found['name'] or found['round']}").text
+
+    number = _VARIABLE.sub(variable, value.text)
+    is_wanted = has_own if inis else _VARIABLE.search(number) is None
+    if (is_wanted and _PUT_TOGETHER.search(number)) or "[" in _VARIABLE.sub("", number):
+        problem = f"{value.text} is no number and no variable that these INI files have"
+        raise token_error(value, problem, source, "Write it as [SECTION]NAME, [SECTION](NAME) or a number")
+    return number if is_wanted else None
+
+
+def _holder(variable: re.Match[str], inis: Iterable[IniText]) -> IniText | None:
+    return next((ini for ini in inis if ini.has_section(variable["section"])), None)
+
+
+def _require_no_other_way(text: HalText, hal: Sequence[Path], inis: Sequence[IniText]) -> None:
+    """Raise ``FileError`` where numbers reach LinuxCNC by more than the files' ``setp`` lines."""
+    names = {path.name for path in hal}
+    for command, *words in text.commands:
+        if command.text == "source" and not names & {Path(word.text).name for word in words}:
+            problem = f"the file of {command.text} {' '.join(word.text for word in words)} may set pins too"
+            raise token_error(command, problem, text.source, "Name that file as well")
+        variables = [found for word in words for found in _VARIABLE.finditer(word.text)]
+        if command.text == "sets" and any(_holder(found, inis) for found in variables):
+            problem = "a signal, not a pin, is set to a variable of the INI files"
+            raise token_error(command, problem, text.source, "Set the pin by setp, without the signal")
 
 
 def _shown(pattern: str) -> Mapping[str, str]:

@@ -13,7 +13,8 @@ from hexacell.cell.loader import load_cell
 from hexacell.config.change import propose
 from hexacell.config.interface import ControllerLimits
 from hexacell.config.layout import ConfigLayout, fingerprint
-from hexacell.config.linuxcnc_ini import limits_of_ini
+from hexacell.config.linuxcnc_hal import HalText
+from hexacell.config.linuxcnc_ini import UNLIMITED, limits_of_ini
 from hexacell.config.write_back import commit, rollback
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
@@ -157,8 +158,57 @@ def test_joints_that_turn_have_limits_in_degrees(ini, kind, limits) -> None:
 
 def test_a_limit_that_is_not_there_is_none(ini) -> None:
     found = limits_of_ini(ini("[AXIS_Z]", "MAX_LIMIT = 700", "[JOINT_0]", "MIN_LIMIT = 1"))
-    assert found == ControllerLimits(axes=(None, None, (-LARGEST_NUMBER, 700.0), None, None, None))
+    joints = ((1.0, LARGEST_NUMBER), *(UNLIMITED,) * 5)
+    axes = (None, None, (-LARGEST_NUMBER, 700.0), None, None, None)
+    assert found == ControllerLimits(joints=joints, axes=axes)
     assert limits_of_ini(ini("[EMC]")) == ControllerLimits()
+
+
+@pytest.mark.parametrize("far", ["1e99", "1E+99", "1000001", "1e999"])
+def test_what_linuxcnc_takes_for_no_limit_is_none(ini, far) -> None:
+    both = "[AXIS_Z]", f"MIN_LIMIT = -{far}", f"MAX_LIMIT = {far}"
+    assert limits_of_ini(ini(*both)) == ControllerLimits()
+    found = limits_of_ini(ini(*both[:2], "MAX_LIMIT = 70"), 25.4)
+    assert found.axes is not None
+    assert found.axes[2] == pytest.approx((-LARGEST_NUMBER, 1778.0))
+    with pytest.raises(FileError, match="is not within"):
+        limits_of_ini(ini("[AXIS_Z]", f"MIN_LIMIT = {far}"))
+
+
+@pytest.mark.parametrize("end", ["\\", "\\\r", "\\ \t"])
+@pytest.mark.parametrize("hidden", ["MIN_LIMIT = -5", "[AXIS_Y]\nMIN_LIMIT = -5"])
+def test_limits_behind_a_comment_that_goes_on_are_not_taken_for_absent(ini, end, hidden) -> None:
+    with pytest.raises(FileError, match="the line before ends with a backslash") as caught:
+        limits_of_ini(ini("[AXIS_X]", f"# deg {end}", hidden))
+    assert caught.value.line == 3
+
+
+def test_limits_in_a_file_that_is_included_hold_too(ini) -> None:
+    path = ini("[AXIS_X]", "MAX_LIMIT = 5", "#INCLUDE  more.inc\r", "#INCLUDE absent.inc")
+    path.with_name("more.inc").write_text("[AXIS_X]\nMIN_LIMIT = -4\nMAX_LIMIT = 9\n")
+    assert limits_of_ini(path).axes == ((-4.0, 5.0), *(None,) * 5)
+
+
+def test_limits_of_a_section_with_blanks_in_its_brackets_are_not_taken_for_absent(ini) -> None:
+    with pytest.raises(FileError, match="blanks within the brackets"):
+        limits_of_ini(ini("[ AXIS_X ]", "MIN_LIMIT = -5"))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("setp a.b 5 # c", [("a.b", "5", 1)]),
+        ("\nsetp a.b \\\n  5\r\na.c = 6", [("a.b", "5", 3), ("a.c", "6", 4)]),
+        ("setp a.\\\nb 5\nDISPLAY = x --port 5", [("a.b", "5", 2)]),
+        ("setp a.b '#'\nnet x a.c <= a.b", [("a.b", "'#'", 1)]),
+        ("# c \\\r\nsetp a.b 5", [("a.b", "5", 2)]),
+    ],
+)
+def test_pins_of_hal_texts_are_those_that_halcmd_sets(text, expected) -> None:
+    """As halcmd of LinuxCNC 2.9 says which of them it does not find."""
+    found = list(HalText(text, None).pins)
+    assert [(pin, value.text, value.line) for pin, value in found] == expected
+    assert [text[value.start : value.end] for _, value in found] == [value.text for _, value in found]
 
 
 @pytest.mark.parametrize(

@@ -20,9 +20,10 @@ pins = json.loads(kept.read_text())
 if sys.argv[1:] == ["-f"]:
     for line in sys.stdin:
         word, pin, value = line.split()
-        if word != "setp" or pin not in pins:
-            sys.exit(f"<stdin>:1: pin '{{pin}}' not found")
+        if word != "setp" or pin not in pins or pin.endswith("fail"):
+            sys.exit(f"<stdin>:1: pin '{{pin}}' not found, or not writable")
         pins[pin] = value
+        kept.write_text(json.dumps(pins))
     pins["kins.fwd-kins-fail"] = "TRUE" if float(pins["kins.l.0"]) > 900.0 else "FALSE"
     kept.write_text(json.dumps(pins))
 else:
@@ -102,6 +103,60 @@ def test_one_number_that_cannot_be_set_leaves_all_as_they_were(pins, files, ini,
     with pytest.raises(error, match=words):
         set_pins(files(ini=ini))
     assert pins()["kins.l.1"] == "580"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "setp kins.l.1 [KINS](L2)",
+        "setp kins.l.1 \\\n   [KINS]L2 # goes on",
+        "setp \\\n\tkins.l.1 \\\n[KINS](L2)",
+        "kins.l.1 = [KINS]L2\r",
+        "setp kins.l.1 [KINS](L2)e0",
+        "# no more \\\n# than a remark\nsetp kins.l.1 [KINS]L2",
+    ],
+)
+def test_every_form_in_which_halcmd_takes_a_variable_is_set(pins, files, line) -> None:
+    assert set_pins(files(hal=f"setp kins.l.0 [KINS]L1\n{line}\n")) == 2
+    assert float(pins()["kins.l.1"]) == 582.5
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("setp kins.l.1 \\\r\n [KINS]L2", "does not set one pin to one value"),
+        ("setp kins.l.1 [KINS]\\\nL2", "does not set one pin to one value"),
+        ("setp kins.l.1 [KINS]L2 mm", "does not set one pin to one value"),
+        ("# of leg 2 \\\nsetp kins.l.1 [KINS]L2", "the comment before it ends with a backslash"),
+        ("setp kins.l.1 [KINS]L2[OTHER]GAIN", "no number and no variable"),
+        ("setp kins.l.1 [KINS", "no number and no variable"),
+        ("setp kins.l.1 [KINS](L2", "no number and no variable"),
+        ("setp kins.l.1 [KINS]L2$SUFFIX", "no number and no variable"),
+        ("setp kins.l.1 [KINS]L2\nsetp kins.l.1 5", "set a second time"),
+        ("setp kins.l.1 5\nkins.l.1 = [KINS](L2)", "set a second time"),
+        ("source legs.hal", "source legs.hal may set pins too"),
+        ("net second => kins.l.1\nsets second [KINS]L2", "a signal, not a pin"),
+    ],
+)
+def test_a_line_that_may_set_a_pin_otherwise_is_named_and_nothing_is_set(pins, files, line, words) -> None:
+    with pytest.raises(FileError, match=words) as caught:
+        set_pins(files(hal=f"setp kins.l.0 [KINS]L1\n{line}\n"))
+    assert caught.value.line in {2, 3}
+    assert pins()["kins.l.0"] == "590"
+
+
+@pytest.mark.parametrize("name", ["more.tcl", "more.ini"])
+def test_a_file_of_which_no_pin_gets_a_number_is_named(pins, files, tmp_path, name) -> None:
+    (tmp_path / name).write_text("[MORE]\nL2 = 5.0\n")
+    with pytest.raises(FileError, match=f"{name}: no line sets a pin"):
+        set_pins([*files(), tmp_path / name])
+    assert pins()["kins.l.0"] == "590"
+
+
+def test_pins_before_one_that_halcmd_cannot_set_get_their_old_numbers_again(pins, files) -> None:
+    with pytest.raises(UsageError, match="halcmd failed"):
+        set_pins(files(hal="setp kins.l.0 [KINS]L1\nsetp kins.fwd-kins-fail [KINS]L2\n"))
+    assert pins()["kins.l.0"] == "590"
 
 
 def test_a_call_that_would_set_nothing_fails(pins, files) -> None:

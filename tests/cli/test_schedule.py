@@ -1,6 +1,10 @@
 """``hexacell schedule``: writes, shows and removes units of its own, and no others."""
 
+from pathlib import Path
+
 import pytest
+
+from hexacell.services.unattended import scheduled_run
 
 UNITS = ["hexacell-simulated-hexaglide.service", "hexacell-simulated-hexaglide.timer"]
 
@@ -108,3 +112,29 @@ def test_what_makes_no_sense_is_refused(schedule, units) -> None:
         outcome = schedule(*words)
         assert (outcome.code, problem in outcome.err) == (2, True)
     assert not units.exists()
+
+
+@pytest.mark.parametrize(
+    ("zone", "daily", "other"),
+    [
+        ("Europe/Berlin", "02:30", "03:30"),
+        ("Europe/London", "01:00", "02:00"),
+        ("America/New_York", "02:59", "03:59"),
+        ("Australia/Lord_Howe", "02:15", "03:15"),
+        ("Europe/Berlin", "03:00", None),
+        ("Africa/Cairo", "00:30", "01:30"),
+        ("Europe/Berlin", "01:59", None),
+        ("Asia/Tokyo", "02:30", None),
+        ("", "02:30", None),
+    ],
+)
+def test_a_time_that_one_night_does_not_have_is_warned_of(
+    schedule, monkeypatch, zone, daily, other
+) -> None:
+    if not (zones := Path("/usr/share/zoneinfo")).is_dir():
+        pytest.skip("there are no time zones here")
+    monkeypatch.setattr(scheduled_run, "LOCAL_TIME", zones / zone)
+    outcome = schedule("--daily", daily)
+    assert outcome.code == 0
+    assert ("is not there on 20" in outcome.err) == (other is not None)
+    assert other is None or f"Take {other}, or" in outcome.err

@@ -27,7 +27,7 @@ from hexacell.services.unattended.outbox import (
     send_waiting,
     waiting_notices,
 )
-from hexacell.services.unattended.scheduled_run import ScheduledRun
+from hexacell.services.unattended.scheduled_run import ScheduledRun, skipped_day
 from hexacell.services.unattended.schedules import (
     Schedule,
     present_schedule,
@@ -126,6 +126,11 @@ def schedule(options: argparse.Namespace, console: Console) -> ExitCode:
         raise UsageError("the time of day is missing", action="Give --daily 02:30, --show or --remove")
     else:
         run = scheduled_run(cell, options.daily, options.mode, options.metrics)
+        if (day := skipped_day(run.hour, run.minute, local_now().date())) is not None:
+            console.warn(
+                f"{options.daily} is not there on {day}, as clocks go forward; that night nothing begins. "
+                f"Take {(run.hour + 1) % 24:02}:{run.minute:02}, or set the computer's zone to UTC"
+            )
         written = write_schedule(run, options.folder)
         console.show(
             _schedule_document(written), written_schedule_text(written, run, cell.settings.unattended)

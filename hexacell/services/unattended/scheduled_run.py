@@ -7,14 +7,17 @@ systemd.timer(5), systemd.syntax(7).
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import date, datetime, time, timedelta
 from pathlib import Path
 from typing import ClassVar
+from zoneinfo import ZoneInfo
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from hexacell.errors import ExitCode, UsageError
 
 _TIME = re.compile(r"([01][0-9]|2[0-3]):([0-5][0-9])")
+DAYS_OF_A_YEAR = 366
 STOPPING_S = 120
 """So long a run may take to stop the robot and to keep its journal before it is killed."""
 
@@ -85,6 +88,27 @@ MARK = "# Written by `hexacell schedule` for "
 WORTH_ANOTHER_TRY = (ExitCode.HARDWARE, ExitCode.BUSY)
 
 TEMPORARY = (Path("/tmp"), Path("/var/tmp"))  # noqa: S108 - what PrivateTmp hides
+
+
+LOCAL_TIME = Path("/etc/localtime")
+"""The zone of the computer, which systemd takes; UTC without."""
+
+
+def skipped_day(hour: int, minute: int, today: date) -> date | None:
+    """The first day within a year on which clocks go forward past a time of day in the computer's zone.
+
+    systemd then begins nothing; where a time is there twice it begins once (as ``systemd-analyze`` tells).
+    """
+    try:
+        with LOCAL_TIME.open("rb") as file:
+            zone = ZoneInfo.from_file(file)
+    except (OSError, ValueError):
+        return None
+    for day in (today + timedelta(days) for days in range(DAYS_OF_A_YEAR)):
+        at = datetime.combine(day, time(hour, minute), zone)
+        if at.timestamp() > at.replace(fold=1).timestamp():
+            return day
+    return None
 
 
 def service_text(run: ScheduledRun, user: str | None, groups: Sequence[str]) -> str:

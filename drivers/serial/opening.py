@@ -29,8 +29,8 @@ WITHOUT_WRITE_TIMEOUT = "rfc2217://"
 """pyserial has no write time-out there, and refuses to open with one (its issue 412)."""
 
 _ABSENT = ("is absent", "Plug it in or correct port in the cell file")
-_NOT_PERMITTED = ("may not be opened by this user", "Let the user into the group that owns it")
-_IN_USE = ("is in use", "Close the other program that has it open")
+_NOT_PERMITTED = ("may not be opened by this user", "Let the user into its group: docs/howto-host.md")
+_IN_USE = ("is in use", "Close the other program, or ModemManager: docs/howto-host.md")
 _CAUSES = {
     errno.ENOENT: _ABSENT,
     errno.ENODEV: _ABSENT,

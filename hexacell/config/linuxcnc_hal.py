@@ -100,11 +100,7 @@ class HalText:
 
     @property
     def pins(self) -> Iterator[tuple[str, NumberToken]]:
-        """Each pin that is set, with what it is set to, in the order of the text.
-
-        Raises:
-            FileError: a command is not one pin and one value, or is in a comment that goes on.
-        """
+        """Each pin that is set, and to what; raises ``FileError`` where these are not one each."""
         for words in self.commands:
             is_assignment = len(words) == 3 and words[1].text == "="
             if words[0].text != "setp" and not is_assignment:
@@ -119,11 +115,7 @@ class HalText:
 
     @property
     def commands(self) -> Iterator[tuple[NumberToken, ...]]:
-        """The words of each command, as halcmd sees them.
-
-        Raises:
-            FileError: a command that sets a pin is in a comment that goes on in its line.
-        """
+        """The words of each command that halcmd sees; raises ``FileError`` where a comment hides one."""
         number = 1
         for line in _LINE.finditer(self.text):
             start, code = line.span("code")

@@ -1,6 +1,7 @@
 """Before a run: exclusions written into the cell file, one at a time, and warnings about the cell."""
 
 import ipaddress
+import os
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -17,11 +18,12 @@ from hexacell.cell.operation import scheme_of
 from hexacell.dry_run.campaign import VisitedPose
 from hexacell.errors import FileError, UsageError
 from hexacell.kinematics.pose import Pose
-from hexacell.storage.atomic_files import BYTE_ORDER_MARK, read_bytes, write_atomically
+from hexacell.storage.atomic_files import BYTE_ORDER_MARK, read_bytes, read_if_present, write_atomically
 
 _TABLES = (Path("/proc/net/tcp"), Path("/proc/net/tcp6"))
 """The kernel's tables of the ports of this computer."""
 _LISTENING = "0A"
+_LATENCY_TIMERS = Path("/sys/bus/usb-serial/devices")
 
 
 def toggle_exclusion(cell: Cell, name: str, planned: Sequence[VisitedPose]) -> Cell:
@@ -145,6 +147,17 @@ def exposure_warnings(cell: Cell) -> Iterator[str]:
             f"{where}: it accepts connections from the network too, and whoever reaches that port may move "
             "the robot. Let it listen on 127.0.0.1 alone, or close the port in the firewall"
         )
+
+
+def port_warnings(cell: Cell, timers: Path = _LATENCY_TIMERS) -> Iterator[str]:
+    """Adapters that hand on bytes late, and names that another adapter may get."""
+    gauges = () if cell.settings.simulation is not None else cell.settings.gauges
+    for port, name in {gauge.port: gauge.name for gauge in gauges if gauge.port}.items():
+        device = Path(os.path.realpath(port)).name
+        if (wait := int(read_if_present(timers / device / "latency_timer") or 0)) > 1:
+            yield f"gauge {name}: its adapter keeps bytes for {wait} ms: docs/howto-host.md, Latency timers"
+        if port.startswith(("/dev/ttyUSB", "/dev/ttyACM")):
+            yield f"gauge {name}: tomorrow {port} may be another: docs/howto-host.md, Names that stay"
 
 
 def accepts_from_network(port: int, tables: Sequence[Path] = _TABLES) -> bool:

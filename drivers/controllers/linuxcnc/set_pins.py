@@ -17,7 +17,7 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -33,7 +33,7 @@ KINEMATICS_CYCLES_S = 0.1
 TIMEOUT_S = 10.0
 FAILURE_PINS = "*fwd-kins-fail"
 
-_VARIABLE = re.compile(r"\[(?P<section>[^\]]+)\](?:(?P<name>[\w.-]+)|\((?P<round>[^)]+)\))", re.ASCII)
+_VARIABLE = re.compile(r"\[([^\]]+)\](?:([\w.-]+)|\(([^)]+)\))", re.ASCII)
 _PUT_TOGETHER = re.compile(r"[\[$\"']")
 """In a word of which halcmd replaces a part."""
 
@@ -102,17 +102,15 @@ def _wanted(hal: Sequence[Path], inis: Sequence[IniText]) -> Mapping[str, str]:
 
     Where there are INI files, they have the geometry, and a number in the HAL file is not part of it.
     """
-    wanted, others, used = dict[str, str](), set[str](), set[Path | None]()
+    found, used = dict[str, str | None](), set[Path | None]()
     for text in (HalText(read_text(path), path) for path in hal):
         _require_no_other_way(text, hal, inis)
         for pin, value in text.pins:
             number = _filled(value, inis, text.source, used)
-            if pin in wanted or (number is not None and pin in others):
+            if pin in found and (number or found[pin]):
                 raise token_error(value, f"{pin} is set a second time", text.source, "Remove one")
-            if number is None:
-                others.add(pin)
-            else:
-                wanted[pin] = number
+            found[pin] = number
+    wanted = {pin: number for pin, number in found.items() if number is not None}
     if unused := [ini.source for ini in inis if wanted and ini.source not in used]:
         action = "Leave it out, or set its pins in a HAL file"
         raise FileError("no line sets a pin to a variable of it", subject=unused[0], action=action)
@@ -123,39 +121,31 @@ def _filled(
     value: NumberToken, inis: Sequence[IniText], source: Path | None, used: set[Path | None]
 ) -> str | None:
     """What a pin is to get, None if that is not part of the geometry; ``used`` gets the INI files of it."""
-    has_own = False
-
-    def variable(found: re.Match[str]) -> str:
-        nonlocal has_own
-        if (ini := _holder(found, inis)) is None:
-            return found[0]
-        has_own = True
+    number, own = value.text, list(_of_files(value, inis))
+    for variable, ini in own:
+        number = number.replace(variable[0], ini.number(f"{variable[1]}/{variable[2] or variable[3]}").text)
         used.add(ini.source)
-        return ini.number(f"{found['section']}/{found['name'] or found['round']}").text
-
-    number = _VARIABLE.sub(variable, value.text)
-    is_wanted = has_own if inis else _VARIABLE.search(number) is None
+    is_wanted = bool(own) if inis else _VARIABLE.search(number) is None
     if (is_wanted and _PUT_TOGETHER.search(number)) or "[" in _VARIABLE.sub("", number):
         problem = f"{value.text} is no number and no variable that these INI files have"
         raise token_error(value, problem, source, "Write it as [SECTION]NAME, [SECTION](NAME) or a number")
     return number if is_wanted else None
 
 
-def _holder(variable: re.Match[str], inis: Iterable[IniText]) -> IniText | None:
-    return next((ini for ini in inis if ini.has_section(variable["section"])), None)
+def _of_files(word: NumberToken, inis: Sequence[IniText]) -> Iterator[tuple[re.Match[str], IniText]]:
+    """The variables in a word of which an INI file has the section, each with the first such file."""
+    for found in _VARIABLE.finditer(word.text):
+        yield from [(found, ini) for ini in inis if ini.has_section(found[1])][:1]
 
 
 def _require_no_other_way(text: HalText, hal: Sequence[Path], inis: Sequence[IniText]) -> None:
     """Raise ``FileError`` where numbers reach LinuxCNC by more than the files' ``setp`` lines."""
-    names = {path.name for path in hal}
     for command, *words in text.commands:
-        if command.text == "source" and not names & {Path(word.text).name for word in words}:
-            problem = f"the file of {command.text} {' '.join(word.text for word in words)} may set pins too"
-            raise token_error(command, problem, text.source, "Name that file as well")
-        variables = [found for word in words for found in _VARIABLE.finditer(word.text)]
-        if command.text == "sets" and any(_holder(found, inis) for found in variables):
-            problem = "a signal, not a pin, is set to a variable of the INI files"
-            raise token_error(command, problem, text.source, "Set the pin by setp, without the signal")
+        is_named = {path.name for path in hal} & {Path(word.text).name for word in words}
+        is_of_signal = any(list(_of_files(word, inis)) for word in words)
+        if (command.text == "source" and not is_named) or (command.text == "sets" and is_of_signal):
+            problem = f"{command.text} {' '.join(word.text for word in words)} may set pins too"
+            raise token_error(command, problem, text.source, "Name the file too, or set the pin by setp")
 
 
 def _shown(pattern: str) -> Mapping[str, str]:

@@ -13,7 +13,7 @@ from hexacell.cell.passwords import password_warnings, with_passwords
 from hexacell.cli.console import Console
 from hexacell.config.pending_write import settle_config
 from hexacell.errors import ExitCode, UsageError
-from hexacell.services.preflight import certificate_warnings, exposure_warnings, telling_warnings
+from hexacell.services import preflight
 from hexacell.text.config_changes import files_named
 
 
@@ -45,7 +45,7 @@ def main(options: argparse.Namespace, console: Console) -> ExitCode:
 def cell_at(path: Path, console: Console) -> Cell:
     """The cell; raises ``FileError`` or ``SeveralErrors`` as ``load_cell`` does."""
     cell = load_cell(path)
-    for warning in (*password_warnings(cell), *telling_warnings(cell)):
+    for warning in (*password_warnings(cell), *preflight.telling_warnings(cell)):
         console.warn(warning)
     if (settled := settle_config(*cell.config_paths)) is not None:
         console.warn(settled)
@@ -55,8 +55,9 @@ def cell_at(path: Path, console: Console) -> Cell:
 def cell_with_devices_at(path: Path, console: Console) -> Cell:
     """The cell for a command that is about its devices, with warnings about them too."""
     cell = cell_at(path, console)
-    for warning in (*exposure_warnings(cell), *certificate_warnings(cell)):
-        console.warn(warning)
+    for of in (preflight.exposure_warnings, preflight.certificate_warnings, preflight.port_warnings):
+        for warning in of(cell):
+            console.warn(warning)
     return cell
 
 

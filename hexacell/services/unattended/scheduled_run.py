@@ -6,6 +6,7 @@ systemd.timer(5), systemd.syntax(7).
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import date, datetime, time, timedelta
 from pathlib import Path
@@ -99,15 +100,12 @@ def skipped_day(hour: int, minute: int, today: date) -> date | None:
 
     systemd then begins nothing; where a time is there twice it begins once (as ``systemd-analyze`` tells).
     """
-    try:
-        with LOCAL_TIME.open("rb") as file:
-            zone = ZoneInfo.from_file(file)
-    except (OSError, ValueError):
-        return None
-    for day in (today + timedelta(days) for days in range(DAYS_OF_A_YEAR)):
-        at = datetime.combine(day, time(hour, minute), zone)
-        if at.timestamp() > at.replace(fold=1).timestamp():
-            return day
+    with suppress(OSError, ValueError), LOCAL_TIME.open("rb") as file:
+        zone = ZoneInfo.from_file(file)
+        for day in (today + timedelta(days) for days in range(DAYS_OF_A_YEAR)):
+            at = datetime.combine(day, time(hour, minute), zone)
+            if at.timestamp() > at.replace(fold=1).timestamp():
+                return day
     return None
 
 

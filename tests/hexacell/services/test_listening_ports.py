@@ -1,11 +1,15 @@
-"""A server that the network can reach is told from one that only this computer can."""
+"""What is told of a cell's computer: ports that the network reaches, late adapters, passing names."""
 
 import socket
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from hexacell.services.preflight import accepts_from_network, is_loopback
+from hexacell.cell.loader import load_cell
+from hexacell.services.preflight import accepts_from_network, is_loopback, port_warnings
+
+CELL = Path(__file__).parents[3] / "configs" / "simulated-hexaglide.toml"
 
 
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="no tables of this kernel")
@@ -33,3 +37,37 @@ def test_addresses_are_read_as_the_kernel_writes_them(tmp_path: Path) -> None:
 def test_names_of_this_computer() -> None:
     assert all(map(is_loopback, ("127.0.0.1", "::1", "LocalHost")))
     assert not any(map(is_loopback, ("192.168.1.7", "robot")))
+
+
+def test_late_adapters_and_passing_names_are_told_once_a_port(tmp_path: Path) -> None:
+    (tmp_path / "dev").mkdir()
+    by_id = tmp_path / "dev" / "by-id"
+    by_id.symlink_to("ttyUSB7")
+    for device, wait in (("ttyUSB0", "16"), ("ttyUSB1", "1"), ("ttyUSB7", "16")):
+        (tmp_path / device).mkdir()
+        (tmp_path / device / "latency_timer").write_text(f"{wait}\n")
+    cell = load_cell(CELL)
+    ports = ("/dev/ttyUSB0", "/dev/ttyUSB1", str(by_id))
+
+    def told(*named: str) -> list[str]:
+        gauges = [
+            one.model_copy(update={"port": port})
+            for one, port in zip(cell.settings.gauges, named, strict=True)
+        ]
+        settings = cell.settings.model_copy(update={"gauges": tuple(gauges), "simulation": None})
+        return [
+            line.partition(":")[2] for line in port_warnings(replace(cell, settings=settings), tmp_path)
+        ]
+
+    late, passing = "its adapter keeps bytes for 16 ms", "may be another"
+    found = told(*ports)
+    assert [(late in line, passing in line) for line in found] == [
+        (True, False),
+        (False, True),
+        (False, True),
+        (True, False),
+    ]
+    assert all("docs/howto-host.md" in line for line in found)
+    assert len(told(*[ports[0]] * 3)) == 2
+    assert told("socket://nowhere:4001", "/dev/absent", "") == []
+    assert list(port_warnings(cell, tmp_path)) == []

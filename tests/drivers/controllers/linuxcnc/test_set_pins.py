@@ -135,7 +135,7 @@ def test_every_form_in_which_halcmd_takes_a_variable_is_set(pins, files, line) -
         ("setp kins.l.1 [KINS]L2\nsetp kins.l.1 5", "set a second time"),
         ("setp kins.l.1 5\nkins.l.1 = [KINS](L2)", "set a second time"),
         ("source legs.hal", "source legs.hal may set pins too"),
-        ("net second => kins.l.1\nsets second [KINS]L2", "a signal, not a pin"),
+        ("net second => kins.l.1\nsets second [KINS]L2", "may set pins too"),
     ],
 )
 def test_a_line_that_may_set_a_pin_otherwise_is_named_and_nothing_is_set(pins, files, line, words) -> None:

@@ -1,18 +1,17 @@
 """``hexacell apply`` and ``rollback``: a proposal written into the controller's config, and undone."""
 
 import argparse
-import asyncio
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from hexacell.cli.commands.cell import cell_at
 from hexacell.cli.console import Console
-from hexacell.cli.terminal import TerminalOperator, is_interactive
+from hexacell.cli.terminal import SignalCommands, TerminalOperator, is_interactive
 from hexacell.config.pending_write import settle_config
 from hexacell.config.versions import ConfigEditedSince
 from hexacell.errors import ExitCode
 from hexacell.runs.run_folder import RunFolder
-from hexacell.services.write_back.config_rollback import roll_back_config
+from hexacell.services.write_back.config_rollback import ConfigRollback, roll_back_config
 from hexacell.services.write_back.proposals import apply_proposal, read_proposal
 from hexacell.text.config_changes import applied_text, rollback_text, versions_text
 from hexacell.text.verdict import teaching_sentence
@@ -26,7 +25,8 @@ def apply_run(options: argparse.Namespace, console: Console) -> ExitCode:
         console.warn(settled)
     operator = TerminalOperator(console) if is_interactive() else UnattendedOperator()
     with _edits_shown(console):
-        applied = asyncio.run(apply_proposal(proposal, operator, reason=options.reason))
+        # Once it writes, a signal comes too late: it says what it did.
+        applied = SignalCommands(console).run(apply_proposal(proposal, operator, reason=options.reason))
     change, moved = proposal.change, proposal.displacement
     document = {
         "applied": bool(applied.by),
@@ -44,8 +44,12 @@ def apply_run(options: argparse.Namespace, console: Console) -> ExitCode:
 
 def rollback_config(options: argparse.Namespace, console: Console) -> ExitCode:
     """Undo the latest write, or restore what a run wrote."""
+
+    async def rolled_back() -> ConfigRollback:
+        return roll_back_config(cell_at(options.cell, console), options.to, reason=options.reason)
+
     with _edits_shown(console):
-        done = roll_back_config(cell_at(options.cell, console), options.to, reason=options.reason)
+        done = SignalCommands(console).run(rolled_back())
     document = {
         "restored": bool(done.change),
         "config": done.paths[0],

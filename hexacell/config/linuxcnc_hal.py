@@ -5,9 +5,8 @@
 Where the value is a variable of the INI file (``[GENHEXKINS]BASE0X``), that is the config.
 :mod:`~hexacell.config.linuxcnc_legs` says which pins may be beside those of the geometry.
 
-halcmd joins a line that ends with a backslash to the next one before it looks for a comment, and takes
-``PIN = VALUE`` for ``setp PIN VALUE`` (``halcmd_main.c``, ``halcmd.c``). Before a carriage return the
-backslash joins nothing.
+halcmd joins a line that ends with a backslash, none behind it, to the next before it looks for a comment,
+and takes ``PIN = VALUE`` for ``setp PIN VALUE`` (``halcmd_main.c``, ``halcmd.c``).
 """
 
 import re
@@ -106,8 +105,7 @@ class HalText:
             if words[0].text != "setp" and not is_assignment:
                 continue
             value = words[-1]
-            is_cut = len(value.text) != value.end - value.start or value.text.endswith("\\")
-            if len(words) != 3 or is_cut:
+            if len(words) != 3 or len(value.text) != value.end - value.start or value.text.endswith("\\"):
                 problem = "this command does not set one pin to one value within a line"
                 action = "Write setp PIN VALUE; only a backslash right before the line feed goes on"
                 raise token_error(words[0], problem, self.source, action)

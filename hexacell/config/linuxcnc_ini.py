@@ -274,10 +274,9 @@ def limits_of_ini(path: Path, unit_mm: float = 1.0) -> ControllerLimits:
     """
     text = atomic_files.read_text(path, LARGEST_CONFIG_BYTES)
     found = limits_in(IniText(text, path, ""), unit_mm)
-    for included in (path.parent / name for name in _INCLUDE.findall(text)):
-        if included.is_file():
-            more = IniText(atomic_files.read_text(included, LARGEST_CONFIG_BYTES), included, "")
-            found = found.narrowed(limits_in(more, unit_mm))
+    for more in filter(Path.is_file, (path.parent / name for name in _INCLUDE.findall(text))):
+        included = IniText(atomic_files.read_text(more, LARGEST_CONFIG_BYTES), more, "")
+        found = found.narrowed(limits_in(included, unit_mm))
     return found
 
 

@@ -61,6 +61,8 @@ META_DATA = 6
 VARIABLES = {"user": "HEXACELL_OPCUA_USER", "password": "HEXACELL_OPCUA_PASSWORD"}
 CERTIFICATE, KEY = "certificate.der", "private-key.pem"
 VALID_DAYS = 3650
+LOGIN_S = 5.0
+"""So long a connection may last without a login; asyncua keeps all that is sent on it."""
 
 
 class ReaderFile(Section):
@@ -226,6 +228,7 @@ async def _server(settings: OpcUaSettings, reader: Reader, folder: Path) -> Serv
     certificate, key = ensure_certificate(folder, URI, settings.host)
     server = Server(user_manager=reader)  # type: ignore[arg-type]  # it needs the one method
     await server.init()
+    server.iserver.max_pending_activation_seconds = LOGIN_S
     server.set_endpoint(f"opc.tcp://{settings.host}:{settings.port}/hexacell/")
     server.set_server_name("hexacell results")
     await server.set_application_uri(URI)

@@ -119,12 +119,9 @@ def test_what_makes_no_sense_is_refused(schedule, units) -> None:
     [
         ("Europe/Berlin", "02:30", "03:30"),
         ("Europe/London", "01:00", "02:00"),
-        ("America/New_York", "02:59", "03:59"),
         ("Australia/Lord_Howe", "02:15", "03:15"),
-        ("Europe/Berlin", "03:00", None),
         ("Africa/Cairo", "00:30", "01:30"),
         ("Europe/Berlin", "01:59", None),
-        ("Asia/Tokyo", "02:30", None),
         ("", "02:30", None),
     ],
 )

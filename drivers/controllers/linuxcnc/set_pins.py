@@ -35,7 +35,6 @@ FAILURE_PINS = "*fwd-kins-fail"
 
 _VARIABLE = re.compile(r"\[([^\]]+)\](?:([\w.-]+)|\(([^)]+)\))", re.ASCII)
 _PUT_TOGETHER = re.compile(r"[\[$\"']")
-"""In a word of which halcmd replaces a part."""
 
 _SHOWN = re.compile(r"\s*\S+\s+(?:float|bit|[su](?:32|64))\s+\S+\s+(?P<value>\S+)\s+(?P<pin>\S+)")
 

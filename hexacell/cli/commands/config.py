@@ -19,13 +19,12 @@ from procedures.engine.commands import UnattendedOperator
 
 
 def apply_run(options: argparse.Namespace, console: Console) -> ExitCode:
-    """Write the proposal of a run; a person is asked where a gate needs one."""
+    """Write the proposal of a run; a person is asked where a gate needs one. No signal ends a write."""
     proposal = read_proposal(RunFolder(options.run))
     if (settled := settle_config(*proposal.change.paths)) is not None:
         console.warn(settled)
     operator = TerminalOperator(console) if is_interactive() else UnattendedOperator()
     with _edits_shown(console):
-        # Once it writes, a signal comes too late: it says what it did.
         applied = SignalCommands(console).run(apply_proposal(proposal, operator, reason=options.reason))
     change, moved = proposal.change, proposal.displacement
     document = {

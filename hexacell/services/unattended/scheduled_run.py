@@ -18,7 +18,6 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from hexacell.errors import ExitCode, UsageError
 
 _TIME = re.compile(r"([01][0-9]|2[0-3]):([0-5][0-9])")
-DAYS_OF_A_YEAR = 366
 STOPPING_S = 120
 """So long a run may take to stop the robot and to keep its journal before it is killed."""
 
@@ -91,8 +90,7 @@ WORTH_ANOTHER_TRY = (ExitCode.HARDWARE, ExitCode.BUSY)
 TEMPORARY = (Path("/tmp"), Path("/var/tmp"))  # noqa: S108 - what PrivateTmp hides
 
 
-LOCAL_TIME = Path("/etc/localtime")
-"""The zone of the computer, which systemd takes; UTC without."""
+LOCAL_TIME = Path("/etc/localtime")  # as for systemd; UTC without
 
 
 def skipped_day(hour: int, minute: int, today: date) -> date | None:
@@ -102,7 +100,7 @@ def skipped_day(hour: int, minute: int, today: date) -> date | None:
     """
     with suppress(OSError, ValueError), LOCAL_TIME.open("rb") as file:
         zone = ZoneInfo.from_file(file)
-        for day in (today + timedelta(days) for days in range(DAYS_OF_A_YEAR)):
+        for day in (today + timedelta(days) for days in range(366)):
             at = datetime.combine(day, time(hour, minute), zone)
             if at.timestamp() > at.replace(fold=1).timestamp():
                 return day

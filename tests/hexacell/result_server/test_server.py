@@ -6,7 +6,7 @@ import math
 import socket
 import stat
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID
 from hexacell.cell.loader import Cell
 from hexacell.cell.operation import OpcUaSettings
 from hexacell.errors import DeviceError, FileError, UsageError
+from hexacell.result_server import server as server_module
 from hexacell.result_server.server import (
     MOST_RESULTS,
     NAMESPACE,
@@ -204,6 +205,30 @@ async def _changes_nothing(client: Client, cell: Cell, run: str) -> None:
         with pytest.raises(UaError):
             await change
     assert (await results(client, cell))[path[-1]]["ResultId"] == path[-1]
+
+
+async def test_who_has_not_logged_in_reads_nothing_and_is_let_go(cell, client_files, monkeypatch) -> None:
+    monkeypatch.setattr(server_module, "LOGIN_S", 0.2)
+    async with serving(cell) as address:
+        port = int(address.split(":")[2].split("/")[0])
+        client = Client(address)
+        client.application_uri = "urn:test:client"
+        await client.set_security(SecurityPolicyBasic256Sha256, *client_files)
+        await client.connect_socket()
+        await client.send_hello()
+        await client.open_secure_channel()
+        await client.create_session()  # and not activated
+        with pytest.raises(UaError):
+            await client.nodes.objects.get_children()
+        flood = [await asyncio.open_connection("127.0.0.1", port) for _ in range(40)]
+        for reader, writer in flood:
+            writer.write(b"HELF\xff\xff\xff\x7f")  # much is to follow
+            with suppress(ConnectionError):
+                await asyncio.wait_for(reader.read(), 10)
+            writer.close()
+        client.disconnect_socket()
+        async with reading(address, client_files) as known:
+            assert await results(known, cell) == {}
 
 
 async def test_anybody_may_read_only_where_the_cell_says_so(cell, client_files, monkeypatch) -> None:

@@ -28,12 +28,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Before numpy is imported, which reads it: the matrices are small, threads only slow them down.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     typed = sys.argv[1:] if arguments is None else list(arguments)
-    parser = make_parser()
-    if not typed:
-        parser.print_help(sys.stderr)
-        return int(ExitCode.USAGE)
     console = Console("--json" in typed)
     try:
+        parser = make_parser()
+        if not typed:
+            parser.print_help(sys.stderr)
+            return int(ExitCode.USAGE)
         with stop_signals_as_sigint():
             _require_usable(typed)
             options = parser.parse_args(typed)

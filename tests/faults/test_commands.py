@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from hexacell.cell.loader import Cell
-from hexacell.cli.app import main
+from hexacell.cli import app
 from hexacell.config import write_record
 from hexacell.runs import run_folder
 from hexacell.services.history import cell_status
@@ -46,7 +46,7 @@ class Commands:
 
     def type(self, *words: object) -> tuple[int, str]:
         with terminal_signals():
-            code = main([str(word) for word in words])
+            code = app.main([str(word) for word in words])
         said = self._capsys.readouterr()
         return code, said.out + said.err
 
@@ -103,6 +103,11 @@ def test_an_edit_while_a_command_is_stopped_is_kept(commands, name, at) -> None:
 def test_a_limit_reached_at_any_call_is_told_and_the_config_is_whole(commands, name, at, number) -> None:
     assert commands.with_hook(name, at, lambda: OSError(number, os.strerror(number)))[0] in {0, 2, 6}
     assert commands.config in {commands.run.before, commands.run.after}
+
+
+def test_ctrl_c_before_the_arguments_are_known_is_told_in_words(commands, monkeypatch) -> None:
+    monkeypatch.setattr(app, "make_parser", lambda: os.kill(os.getpid(), signal.SIGINT))
+    assert commands.type("status") == (130, "hexacell: interrupted\n")
 
 
 def test_a_config_on_another_file_system_is_written_and_rolled_back(commands) -> None:

@@ -184,11 +184,9 @@ def test_limits_in_a_file_that_is_included_hold_too(ini) -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("setp a.b 5 # c", [("a.b", "5", 1)]),
         ("\nsetp a.b \\\n  5\r\na.c = 6", [("a.b", "5", 3), ("a.c", "6", 4)]),
         ("setp a.\\\nb 5\nDISPLAY = x --port 5", [("a.b", "5", 2)]),
         ("setp a.b '#'\nnet x a.c <= a.b", [("a.b", "'#'", 1)]),
-        ("# c \\\r\nsetp a.b 5", [("a.b", "5", 2)]),
     ],
 )
 def test_pins_of_hal_texts_are_those_that_halcmd_sets(text, expected) -> None:

@@ -126,7 +126,6 @@ def test_every_form_in_which_halcmd_takes_a_variable_is_set(pins, files, line) -
         ("setp kins.l.1 \\\r\n [KINS]L2", "does not set one pin to one value"),
         ("setp kins.l.1 [KINS]\\\nL2", "does not set one pin to one value"),
         ("# of leg 2 \\\nsetp kins.l.1 [KINS]L2", "the comment before it ends with a backslash"),
-        ("setp kins.l.1 [KINS]L2[OTHER]GAIN", "no number and no variable"),
         ("setp kins.l.1 [KINS", "no number and no variable"),
         ("setp kins.l.1 [KINS]L2$SUFFIX", "no number and no variable"),
         ("setp kins.l.1 [KINS]L2\nsetp kins.l.1 5", "set a second time"),

@@ -170,7 +170,16 @@ def responding_nodes(bus: EncoderBus, timeouts: SearchTimeouts = USUAL) -> list[
 
 
 def _described(bus: EncoderBus, number: int, timeout_s: float) -> FoundNode:
-    node = EncoderNode(Leg(0, number), bus, timeout_s)
+    """What a node says of itself, or why it does not: the others are told all the same."""
+    try:
+        return _device(EncoderNode(Leg(0, number), bus, timeout_s), number)
+    except BusError:
+        raise
+    except DeviceError as error:
+        return FoundNode(number, f"it {error.problem}. {error.action}")
+
+
+def _device(node: EncoderNode, number: int) -> FoundNode:
     kind = node.read_optional(od.DEVICE_TYPE)
     if kind not in set(DeviceType):
         profile = "" if kind is None else f", profile {kind & 0xFFFF}; encoders are {od.ENCODER_PROFILE}"

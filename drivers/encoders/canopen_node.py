@@ -3,9 +3,10 @@
 The SDO client can be interrupted, and detects a second device under the same node id.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import TypeVar
 
 from canopen.objectdictionary import ObjectDictionary
 from canopen.sdo.client import SdoClient
@@ -17,6 +18,12 @@ from drivers.errors import SilentNodeError, silent_encoder
 from hexacell.errors import DeviceError
 
 _NMT = 0x000
+ABSENT = frozenset({0x0602_0000, 0x0609_0011})
+"""The abort codes that mean that there is no such entry: no object, no subindex (CiA 301)."""
+TIMES_ASKED, PAUSE_S = 4, 0.1
+"""How often a device is asked that refuses for another reason, which may pass, and the pause between."""
+
+Transferred = TypeVar("Transferred")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +58,8 @@ class NmtCommand(IntEnum):
 class EncoderNode:
     """The CANopen node of one leg's encoder. Integers are read and written as unsigned.
 
-    A node that does not respond is a ``SilentNodeError``; two that respond, and a device that refuses a
-    value or has no such entry, are a ``DeviceError``.
+    A node that does not respond is a ``SilentNodeError``; two that respond, and a device that refuses to
+    be read or a value, or has no such entry, are a ``DeviceError``.
     """
 
     def __init__(self, leg: Leg, bus: EncoderBus, timeout_s: float) -> None:
@@ -76,22 +83,40 @@ class EncoderNode:
         return value
 
     def read_optional(self, entry: ObjectEntry) -> int | None:
-        """The value of an entry; None if the device does not have it."""
+        """The value of an entry; None if the device says that it does not have it."""
         try:
-            return int.from_bytes(self.sdo.upload(entry.index, entry.subindex), "little")
-        except SdoAbortedError:
-            return None
-        except SdoCommunicationError as error:
-            raise self._communication_error(entry, error) from error
+            return self._asked(entry, lambda: self.sdo.value_of(entry))
+        except SdoAbortedError as error:
+            if error.code in ABSENT:
+                return None
+            raise DeviceError(
+                f"refuses {TIMES_ASKED} times to read {entry}: {error}",
+                subject=self.leg.subject,
+                action="Switch it off and on, then open the encoders again; if it stays so, look the code "
+                "up in its manual",
+            ) from error
 
     def write(self, entry: ObjectEntry, value: int) -> None:
         """Write an entry."""
+        data = value.to_bytes(entry.size, "little")
         try:
-            self.sdo.download(entry.index, entry.subindex, value.to_bytes(entry.size, "little"))
+            self._asked(entry, lambda: self.sdo.download(entry.index, entry.subindex, data))
         except SdoAbortedError as error:
             raise setting_refused(f"refuses to set {entry} to {value:#x}: {error}", self.leg) from error
+
+    def _asked(
+        self, entry: ObjectEntry, transfer: Callable[[], Transferred], times: int = TIMES_ASKED
+    ) -> Transferred:
+        """What a transfer gives, or ``SdoAbortedError``: that of the last time, unless it means absence."""
+        try:
+            return transfer()
+        except SdoAbortedError as error:
+            if times == 1 or error.code in ABSENT:
+                raise
         except SdoCommunicationError as error:
             raise self._communication_error(entry, error) from error
+        self._bus.listen(PAUSE_S)
+        return self._asked(entry, transfer, times - 1)
 
     def check_alone(self) -> None:
         """Raise if a second device responded under this node id."""
@@ -127,6 +152,8 @@ def silent_nodes(what: str, legs: Sequence[Leg], *, all_legs: bool) -> SilentNod
 
 SDO_REQUEST = 0x600
 SDO_RESPONSE = 0x580
+_IS_SIZED, _IS_EXPEDITED = 1, 2
+"""Bits of the first byte of a response: it states how many bytes there are; they are in it."""
 _UPLOAD_DEVICE_TYPE = bytes((0x40, 0x00, 0x10, 0, 0, 0, 0, 0))
 
 
@@ -151,7 +178,17 @@ class CountingSdoClient(SdoClient):
         self._bus = bus
         self._timeout_s = timeout_s
         self._outstanding = 0
+        self._latest = bytes(8)
         bus.network.subscribe(self.tx_cobid, self.on_response)
+
+    def value_of(self, entry: ObjectEntry) -> int:
+        """The value of an entry, unsigned.
+
+        An expedited response without its size has four bytes: those beyond the entry's are not its own.
+        """
+        data = self.upload(entry.index, entry.subindex)
+        is_sized = self._latest[0] & _IS_SIZED or not self._latest[0] & _IS_EXPEDITED
+        return int.from_bytes(data if is_sized else data[: entry.size], "little")
 
     def probe(self) -> None:
         """Request the device type without waiting; a response sets ``has_responded``."""
@@ -162,7 +199,7 @@ class CountingSdoClient(SdoClient):
         """Handle a received response; a frame that is too short is ignored."""
         if len(data) != 8:
             return
-        self.has_responded = True
+        self.has_responded, self._latest = True, bytes(data)
         self._outstanding -= 1
         self.has_surplus_response = self.has_surplus_response or self._outstanding < 0
         super().on_response(can_id, data, timestamp)  # type: ignore[no-untyped-call]

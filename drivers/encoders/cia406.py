@@ -10,8 +10,8 @@ from drivers.encoders.bank import BankSession, ThreadedBank, bus_settings
 from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode, Leg, NmtCommand
 from drivers.encoders.node_monitor import AlarmPoll, AlarmTiming, NodeMonitor, check_nodes
-from drivers.encoders.object_dictionary import SYNC_COUNTER, DeviceType
-from drivers.encoders.sync_sampling import SyncSampler, configure_position_tpdo
+from drivers.encoders.object_dictionary import DeviceType
+from drivers.encoders.sync_sampling import SyncSampler, configure_position_tpdo, follow_plain_sync
 from drivers.interfaces import DeviceIdentity
 from drivers.wire_trace import TraceRecorder
 from hexacell.cell.devices import EncoderSettings
@@ -83,8 +83,7 @@ class EncoderSession(BankSession):
         node_identity.check_serial_number(node, identity, self._settings)
         if self._data_sheet is not None and (differing := self._data_sheet.check(node)):
             identity = replace(identity, remark="; ".join(filter(None, (identity.remark, differing))))
-        if node.read_optional(SYNC_COUNTER):  # this program sends a SYNC without a counter
-            node.write(SYNC_COUNTER, 0)
+        follow_plain_sync(node)
         return identity
 
 

@@ -111,7 +111,9 @@ class ModbusSession(BankSession):
         self._spans = register_spans(self._described, joined=True)
         try:
             self._sample()
-        except RefusedRequest:
+        except RefusedRequest as refused:
+            if not refused.is_absence:
+                raise
             self._spans = register_spans(self._described, joined=False)
             self._sample()
         adapter = adapter_at(self._url)

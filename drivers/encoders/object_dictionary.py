@@ -52,6 +52,8 @@ ENCODER_PROFILE = 406
 
 DEVICE_TYPE = ObjectEntry(0x1000, 0, 4)
 ERROR_REGISTER = ObjectEntry(0x1001, 0, 1)
+SYNC_ID = ObjectEntry(0x1005, 0, 4)
+"""Identifier of the SYNC that it waits for; bit 30: it sends SYNC itself."""
 SYNC_COUNTER = ObjectEntry(0x1019, 0, 1)
 """At what a counter in the SYNC overflows; 0: the SYNC has none (CiA 301)."""
 PRODUCER_HEARTBEAT = ObjectEntry(0x1017, 0, 2)

@@ -24,6 +24,9 @@ WITH_EVERY_SYNC = 1
 _OFF = 1 << 31
 _NO_RTR = 1 << 30
 _POSITION_BITS = 32
+_SENDS_SYNC = 1 << 30
+_SYNC_SETTING = (1 << 31) - 1
+"""All of 1005h but bit 31, which means nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,9 +82,30 @@ def configure_position_tpdo(node: EncoderNode, kind: DeviceType, heartbeat_ms: i
     for tpdo in tpdos:
         node.write(od.tpdo_parameter(tpdo.number, od.COB_ID), tpdo.cob_id | _OFF)
     channel = _set_up(node, selected, kind)
-    if heartbeat_ms or node.read_optional(od.PRODUCER_HEARTBEAT):
+    heartbeat = node.read_optional(od.PRODUCER_HEARTBEAT)
+    if heartbeat is None and heartbeat_ms:
+        raise DeviceError(
+            f"has no heartbeat ({od.PRODUCER_HEARTBEAT})",
+            subject=node.leg.subject,
+            action="Write `heartbeat_ms = 0` under [encoders]: that it is silent is then seen at the next "
+            "sample, and not before",
+        )
+    if heartbeat_ms or heartbeat:
         node.write(od.PRODUCER_HEARTBEAT, heartbeat_ms)
     return channel
+
+
+def follow_plain_sync(node: EncoderNode) -> None:
+    """Have a node wait for the SYNC of this program, of the usual identifier and without a counter."""
+    setting = node.read_optional(od.SYNC_ID)
+    if setting is not None and setting & _SYNC_SETTING != SYNC:
+        if setting & _SENDS_SYNC:  # it takes no other identifier while it sends (CiA 301)
+            node.write(od.SYNC_ID, setting & ~_SENDS_SYNC)
+        node.write(od.SYNC_ID, SYNC)
+        if node.read(od.SYNC_ID) & _SYNC_SETTING != SYNC:
+            raise setting_refused(f"acknowledges, but does not keep, {od.SYNC_ID} of {SYNC:#x}", node.leg)
+    if node.read_optional(od.SYNC_COUNTER):
+        node.write(od.SYNC_COUNTER, 0)
 
 
 def _read(node: EncoderNode, number: int) -> Tpdo | None:

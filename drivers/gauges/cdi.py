@@ -27,6 +27,8 @@ UNITS = {b"IN": Unit.INCH, b"MM": Unit.MM}
 UNIT_NUMBERS = {1: Unit.INCH, 2: Unit.MM}
 MODES = {0: "ABS", 1: "TIR", 2: "INCR"}
 OUT_OF_BOUNDS = b"OUT OF BOUNDS\r"
+SILENCES = 2
+"""So many mean that it knows no parameters: the answer to one may have been lost."""
 UNKNOWN_PARAMETER = (b"NOT FOUND\r", b"NO ACCESS\r")
 
 
@@ -88,17 +90,19 @@ class CdiGauge(SerialGauge):
         """Its value; None if the instrument does not have it, or knows no parameters at all."""
         if self._knows_parameters is False:
             return None
-        try:
-            value = await self._query(
-                b"?p%03d\r" % parameter, partial(parse_parameter, parameter=parameter)
-            )
-        except GaugeSilent:
-            if self._knows_parameters:
-                raise
-            self._knows_parameters = False
-            return None
-        self._knows_parameters = True
-        return value
+        for _ in range(SILENCES):
+            try:
+                value = await self._query(
+                    b"?p%03d\r" % parameter, partial(parse_parameter, parameter=parameter)
+                )
+            except GaugeSilent:
+                if self._knows_parameters:
+                    raise
+            else:
+                self._knows_parameters = True
+                return value
+        self._knows_parameters = False
+        return None
 
 
 def _flag(number: int | None) -> bool | None:

@@ -37,8 +37,17 @@ EXCEPTIONS = {
     2: "illegal data address",
     3: "illegal data value",
     4: "device failure",
+    5: "acknowledged, takes long",
     6: "device busy",
+    10: "gateway without a path",
+    11: "no answer to the gateway",
 }
+NOT_THERE = frozenset({2, 3})
+"""Those that mean that there are no such registers, or not so many in one answer."""
+WRONG_REQUEST = frozenset({1, *NOT_THERE})
+BUSY = frozenset({5, 6})
+TIMES_ASKED, PAUSE_S = 4, 0.1
+"""How often a busy device is asked, and the pause between."""
 LINE_KEYS = ("baudrate", "bytesize", "parity", "stopbits")
 
 # Failures are raised as errors; without a handler pymodbus would also print them.
@@ -46,7 +55,9 @@ logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 
 
 class RefusedRequest(DeviceError):
-    """A device answers that it cannot do what it is asked."""
+    """A device answers that it cannot do what it is asked; ``is_absence``: it has no such registers."""
+
+    is_absence = False
 
 
 class ModbusPort(RequestPort):
@@ -79,20 +90,19 @@ class ModbusPort(RequestPort):
         return self.open_count
 
     def exchange(self, request: bytes, _terminator: bytes, timeout_s: float) -> bytes:
-        """Read registers; a device that answers with an exception is a ``RefusedRequest``."""
+        """Read registers; a device that answers with an exception, not busy, is a ``RefusedRequest``."""
         device, function, address, count = REQUEST.unpack(request)
-        self._received = b""
-        with self._requesting() as client:
-            client.comm_params.timeout_connect = timeout_s
-            read = client.read_holding_registers if function == HOLDING else client.read_input_registers
-            answer = read(address, count=count, device_id=device)
+        for _ in range(TIMES_ASKED):
+            self._received = b""
+            with self._requesting() as client:
+                client.comm_params.timeout_connect = timeout_s
+                read = client.read_holding_registers if function == HOLDING else client.read_input_registers
+                answer = read(address, count=count, device_id=device)
+            if not (answer.isError() and answer.exception_code in BUSY):
+                break
+            self.closing.wait(PAUSE_S)
         if answer.isError():
-            code = answer.exception_code
-            raise RefusedRequest(
-                f"device {device} answers exception {code} ({EXCEPTIONS.get(code, 'of its maker')})",
-                subject=self.subject,
-                action="Correct device, kind and register of modbus in the cell file",
-            )
+            raise self._refused(device, answer.exception_code)
         frame_bytes = FRAME_BYTES + REGISTER_BYTES * count
         if len(answer.registers) != count or not self._is_alone(frame_bytes):
             self._must_clear = True  # one of several frames, of which nobody knows which is the answer
@@ -110,6 +120,17 @@ class ModbusPort(RequestPort):
         if client is not None:
             with suppress(OSError, termios.error):
                 client.close()
+
+    def _refused(self, device: int, code: int) -> RefusedRequest:
+        refused = RefusedRequest(
+            f"device {device} answers exception {code} ({EXCEPTIONS.get(code, 'of its maker')})",
+            subject=self.subject,
+            action="Correct device, kind and register of modbus in the cell file"
+            if code in WRONG_REQUEST
+            else "It answers, so cable and address are right: look the exception up in its manual",
+        )
+        refused.is_absence = code in NOT_THERE
+        return refused
 
     def _next_bytes(self, _size: int | None) -> bytes:
         """What comes until the line pauses; nothing if nothing comes in time."""

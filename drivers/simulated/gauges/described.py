@@ -150,9 +150,9 @@ def answer(device: int, function: int, registers: bytes) -> bytes:
     return body + crc(body)
 
 
-def refusal(device: int, function: int) -> bytes:
-    """The answer where a register is not there."""
-    body = bytes((device, function | 0x80, ILLEGAL_ADDRESS))
+def refusal(device: int, function: int, code: int = ILLEGAL_ADDRESS) -> bytes:
+    """The answer where a register is not there, or where something else prevents one."""
+    body = bytes((device, function | 0x80, code))
     return body + crc(body)
 
 

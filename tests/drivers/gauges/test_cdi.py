@@ -110,9 +110,16 @@ async def test_opening_identifies_the_gauge_and_reading_gives_its_value(dialogue
 
 
 async def test_an_older_indicator_without_parameters_is_accepted(dialogue, gauge):
-    dialogue.expect((b"R\r", VALUE), (b"?p011\r",), (b"R\r", VALUE))
+    dialogue.expect((b"R\r", VALUE), (b"?p011\r",), (b"?p011\r",), (b"R\r", VALUE))
     await gauge.open()
     await gauge.check()
+
+
+async def test_one_lost_answer_does_not_mean_that_there_are_no_parameters(dialogue, gauge):
+    asked = opening(p021=b"1\r\n")
+    dialogue.expect(asked[0], (b"?p011\r",), *asked[1:], *2 * asked)
+    with pytest.raises(WrongSetting, match="hold"):
+        await gauge.open()
 
 
 async def test_an_answer_of_which_only_the_line_end_came_is_damage_and_no_silence(dialogue, opened):

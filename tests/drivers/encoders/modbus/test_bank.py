@@ -10,8 +10,10 @@ from hypothesis import strategies as st
 from drivers.encoders.modbus import ModbusBank, RegisterSpan, counts_in, register_spans
 from drivers.errors import BusError, InvalidSampleError, SilentNodeError
 from drivers.interfaces import DeviceIdentity
+from drivers.serial import modbus_port
 from drivers.serial.modbus_port import RefusedRequest
-from drivers.simulated.encoders.modbus_bank import SimulatedModbusBank
+from drivers.simulated.encoders.modbus_bank import ModbusScales, SimulatedModbusBank
+from drivers.simulated.gauges.described import refusal
 from drivers.wire_trace import TrafficDirection, WireTrace
 from hexacell.cell.described_devices import ModbusEncoderSettings
 from hexacell.cell.devices import LinearEncoderSettings
@@ -194,6 +196,42 @@ async def test_a_register_that_is_not_there_is_told(simulated):
     message = r"encoder of leg 1 \(device 1\): device 1 answers exception 2 \(illegal data address\)"
     with pytest.raises(RefusedRequest, match=message):
         await bank.open()
+
+
+@pytest.fixture
+def refusing(monkeypatch):
+    """Has the devices refuse every request, or some, with an exception."""
+    monkeypatch.setattr(modbus_port, "PAUSE_S", 0.0)
+    answer, asked = ModbusScales.answer, []
+
+    def begin(code: int, times: int = 1000) -> list[bytes]:
+        def refuse(scales: ModbusScales, command: bytes) -> bytes:
+            asked.append(command)
+            return answer(scales, command) if len(asked) > times else refusal(command[0], command[1], code)
+
+        monkeypatch.setattr(ModbusScales, "answer", refuse)
+        return asked
+
+    return begin
+
+
+async def test_a_busy_device_is_asked_again(simulated, refusing):
+    cell = simulated()
+    refusing(6, times=3)
+    await cell.driver.open()
+    assert (await cell.driver.read()).positions == pytest.approx(ALL)
+
+
+@pytest.mark.parametrize(("code", "times"), [(4, 1), (6, 4), (11, 1), (77, 1)])
+async def test_no_exception_but_of_absence_means_that_registers_are_not_there(
+    simulated, refusing, code, times
+):
+    cell = simulated(registers=(0, 10, 20, 30, 40, 50))
+    asked = refusing(code)
+    with pytest.raises(RefusedRequest, match=rf"answers exception {code} .*look the exception up"):
+        await cell.driver.open()
+    assert {command[2:6] for command in asked} == {bytes.fromhex("00 00 00 34")}
+    assert len(asked) == times
 
 
 async def test_what_the_cell_file_lacks_is_told():

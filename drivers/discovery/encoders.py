@@ -29,9 +29,14 @@ from hexacell.errors import DeviceError, HexacellError
 from hexacell.kinematics.parameters import JointUnit
 
 SLCAN_LINE = {"baudrate": 115200}
-SLCAN_QUESTION = b"\rV\r"
-"""Its version; the first line end ends whatever was asked before in another protocol."""
-SLCAN_VERSION = re.compile(rb"\a*V[0-9A-Fa-f]{4}\r")
+SLCAN_QUESTIONS = (b"\rV\r", b"V\r")
+"""Its version; the first line end ends, or repeats, what was asked before in another protocol."""
+SLCAN_VERSION = re.compile(
+    rb"[\a\n]*(?:V[0-9A-F]{4}|[0-9A-F]{7,40}\S* [ -~]*[./][ -~]*"
+    rb"|[ -~]*(?:slcan|canable|cantact|candle|canusb|usb.?can|usbtin)[ -~]*)\r",
+    re.IGNORECASE,
+)
+"""That of LAWICEL and their like, of a build by its hash and address, or one that names what it is."""
 NETWORK_DEVICES = Path("/sys/class/net")
 ARPHRD_CAN = "280"
 """The type of a CAN interface (linux/if_arp.h)."""
@@ -135,9 +140,12 @@ def socketcan_interfaces() -> tuple[str, ...]:
 def speaks_slcan(port: str, timeouts: SearchTimeouts = USUAL) -> bool:
     """Whether a CAN adapter with the slcan protocol answers on a serial port; it is asked its version."""
     line = SerialPort(port, SLCAN_LINE, threading.Event())
-    with closing(line), suppress(HexacellError, NoAnswer):
+    with closing(line), suppress(HexacellError):
         line.open()
-        return SLCAN_VERSION.fullmatch(line.exchange(SLCAN_QUESTION, b"\r", timeouts.adapter)) is not None
+        for question in SLCAN_QUESTIONS:
+            with suppress(NoAnswer):
+                if SLCAN_VERSION.fullmatch(line.exchange(question, b"\r", timeouts.adapter)):
+                    return True
     return False
 
 

@@ -7,8 +7,10 @@ simultaneous. cantools is imported when a cell names such a file.
 
 import threading
 import time
+from codecs import BOM_UTF8
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import can
@@ -63,7 +65,9 @@ def read_signals(settings: DbcSettings, unit: JointUnit, step: float) -> tuple[P
     """
     cantools = optional("cantools", "dbc", "encoders")
     try:
-        found = cantools.database.load_file(settings.file)
+        with Path(settings.file).open("rb") as file:
+            encoding = "utf-8-sig" if file.read(len(BOM_UTF8)) == BOM_UTF8 else None
+        found = cantools.database.load_file(settings.file, encoding=encoding, strict=False)
     except (OSError, UnicodeDecodeError, cantools.Error) as error:
         raise FileError(f"cannot be read: {error}", subject=settings.file, action="Correct it") from error
     named = enumerate(settings.signals, 1)
@@ -81,6 +85,14 @@ def _signal(
     message_name, _, signal_name = name.partition(".")
     message = _named(found.messages, message_name, "message", settings)
     signal = _named(message.signals, signal_name, "signal", settings)
+    try:
+        message.refresh(strict=True)
+    except optional("cantools", "dbc", "encoders").Error as error:
+        raise FileError(
+            f"contradicts itself: {str(error).rstrip('.')}",
+            subject=settings.file,
+            action="Correct the signals there: the position would be read from bits of another",
+        ) from error
     for needed in settings.must_be:
         _named(message.signals, needed, "signal", settings)
     scales = SCALES[unit]

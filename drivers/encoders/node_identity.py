@@ -7,15 +7,11 @@ perhaps on purpose.
 """
 
 import math
+import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Sequence
-from configparser import Error as SyntaxFault
-from configparser import RawConfigParser
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
-
-from canopen.objectdictionary import ObjectDictionary, ODVariable
-from canopen.objectdictionary.eds import import_eds
 
 from drivers.encoders import object_dictionary as od
 from drivers.encoders.can_bus import EncoderBus
@@ -168,7 +164,9 @@ def check_serial_number(node: EncoderNode, identity: DeviceIdentity, settings: E
 
 
 WHAT_IT_IS = {"device type": od.DEVICE_TYPE, "vendor": od.VENDOR, "product": od.PRODUCT}
-ABOUT = "DeviceInfo"
+ABOUT, DEFAULT = "deviceinfo", "defaultvalue"
+ABOUT_KEYS = {od.VENDOR: "vendornumber", od.PRODUCT: "productnumber"}
+OCTAL = re.compile(r"-?0[0-7]+")
 HOW_IT_IS_SET = {
     "operating parameters": od.OPERATING_PARAMETERS,
     "preset": od.PRESET,
@@ -209,48 +207,72 @@ class DataSheet:
 
 
 def read_data_sheet(path: Path) -> DataSheet:
-    """The values of an EDS file that are compared.
+    """The values of an EDS file that are compared; whatever else is in it is not looked at.
 
     Raises:
-        FileError: it cannot be read, or is no EDS file.
+        FileError: it cannot be read, says nothing of what a device is, or a value of these is no number.
     """
     try:
-        text = path.read_text(encoding="utf-8", errors="replace")  # names may be in any encoding
-        parser = RawConfigParser(inline_comment_prefixes=(";",))
-        parser.read_string(text)
-        if not parser.has_section(ABOUT):  # canopen would only warn
-            raise _no_data_sheet(path, f"it has no section [{ABOUT}]")
-        dictionary: ObjectDictionary = import_eds(StringIO(text), None)  # type: ignore[no-untyped-call]
+        data = path.read_bytes()
     except OSError as error:
         raise FileError(
             f"cannot be read: {error.strerror}", subject=path, action="Correct eds under [encoders]"
         ) from error
-    except (SyntaxFault, ValueError, KeyError, TypeError, IndexError) as error:
-        raise _no_data_sheet(path, str(error) or type(error).__name__) from error
+    encoding = "utf-16" if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else "utf-8-sig"
+    lines = _lines(data.decode(encoding, errors="replace"))  # names may be in any encoding
     entries = (*WHAT_IT_IS.values(), *HOW_IT_IS_SET.values())
-    values = {entry: value for entry in entries if (value := _default(dictionary, entry)) is not None}
-    if od.DEVICE_TYPE not in values:
-        raise _no_data_sheet(path, f"it has no {od.DEVICE_TYPE}")
+    values = {entry: value for entry in entries if (value := _default(lines, entry, path)) is not None}
+    if not values.keys() & WHAT_IT_IS.values():
+        names = ", ".join(f"{name} ({entry})" for name, entry in WHAT_IT_IS.items())
+        raise FileError(
+            f"is no EDS file of an encoder: it has none of {names}",
+            subject=path,
+            action="Get it from the encoder's maker, or remove eds from [encoders]",
+        )
     return DataSheet(path, values)
 
 
-def _no_data_sheet(path: Path, reason: str) -> FileError:
-    return FileError(
-        f"is no EDS file of an encoder: {' '.join(reason.split())}",
-        subject=path,
-        action="Get it from the encoder's maker, or remove eds from [encoders]",
-    )
+_Lines = dict[tuple[str, str], tuple[str, int]]
+"""By section and key, in small letters: the value and its line; by an empty key what has no ``=``."""
 
 
-def _default(dictionary: ObjectDictionary, entry: ObjectEntry) -> int | None:
+def _lines(text: str) -> _Lines:
+    section, found = "", _Lines()
+    for number, line in enumerate(text.splitlines(), 1):
+        words = line.partition(";")[0].strip()
+        key, equals, value = (part.strip() for part in words.partition("="))
+        if words.startswith("[") and words.endswith("]"):
+            section = words[1:-1].strip().lower()
+        elif value or (words and not equals):
+            found[section, key.lower() if equals else ""] = value or words, number
+    return found
+
+
+def _default(lines: _Lines, entry: ObjectEntry, path: Path) -> int | None:
     """The default of an entry as a node sends it, unsigned; what the file is about has its own section."""
-    found = dictionary.get(entry.index)
-    if isinstance(found, ODVariable):
-        found = found if entry.subindex == 0 else None
-    elif found is not None:
-        found = found.get(entry.subindex)
-    value = None if found is None else found.default
-    if value is None and entry in (od.VENDOR, od.PRODUCT):
-        about = dictionary.device_information
-        value = about.vendor_number if entry is od.VENDOR else about.product_number
-    return int(value) % (1 << 8 * entry.size) if isinstance(value, int) else None
+    whole, part = f"{entry.index:x}", f"{entry.index:x}sub{entry.subindex:x}"
+    is_whole = entry.subindex == 0 or (whole, "compactsubobj") in lines
+    places = [(section, key) for section in (part, whole)[: 1 + is_whole] for key in (DEFAULT, "")]
+    places += [(ABOUT, ABOUT_KEYS[entry])] if entry in ABOUT_KEYS else []
+    place = next((one for one in places if one in lines), None)
+    if place is None:
+        return None
+    text, line = lines[place]
+    if (number := _number(text)) is None:
+        raise FileError(
+            f"has {text!r} in section [{place[0]}], where a number is needed",
+            subject=path,
+            line=line,
+            action="Write DefaultValue= (or the key that is there) and the number, 0x1A if in hexadecimal",
+        )
+    return number % (1 << 8 * entry.size)
+
+
+def _number(text: str) -> int | None:
+    """A number in decimal or hexadecimal; None for another text, and for what may be octal or decimal."""
+    if OCTAL.fullmatch(text) and int(text, 8) != int(text):
+        return None
+    try:
+        return int(text, 16 if "x" in text.lower() else 10)
+    except ValueError:
+        return None

@@ -108,6 +108,54 @@ def test_what_is_no_such_file_is_refused(tmp_path: Path, text: str) -> None:
         read_data_sheet(tmp_path / "other.eds")
 
 
+def changed(old: str, new: str) -> str:
+    text = ABOUT.format(vendor="0x99", kind="0x00080196")
+    assert old in text
+    return text.replace(old, new)
+
+
+STRAY = "[Comments]\nLines=2\nLine1=of\ntwo lines\n[DeviceInfo]\nPDOMapping=\nGranularity=no\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "encoding"),
+    [
+        (changed("[FileInfo]", f"{STRAY}[FileInfo]"), "utf-8"),
+        (changed("SimpleBootUpSlave=1", "Baud=010\nPDOMapping=\nRevisionNumber=x"), "utf-8"),
+        (changed("[6003]", "[6003]\n[6003]\nLowLimit=$NODEID+1"), "utf-8"),
+        (changed("VendorNumber=0x99", "VendorNumber = 153 ; decimal"), "utf-8-sig"),
+        (changed("[1018sub1]", "[1018SUB1]").replace("DefaultValue", "defaultvalue"), "utf-16"),
+    ],
+)
+def test_what_is_not_compared_is_not_looked_at(tmp_path: Path, text: str, encoding: str) -> None:
+    (tmp_path / "encoder.eds").write_text(text, encoding=encoding)
+    values = read_data_sheet(tmp_path / "encoder.eds").values
+    found = [values[entry] for entry in (DEVICE_TYPE, VENDOR, PRODUCT, PRESET)]
+    assert found == [0x0008_0196, 0x99, 8, 2**32 - 5]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("DefaultValue=-5", "DefaultValue=five", r":\d+: has 'five' in section \[6003\]"),
+        ("DefaultValue=-5", "DefaultValue -5", r":\d+: has 'DefaultValue -5' in section \[6003\]"),
+        ("DefaultValue=0x00080196", "DefaultValue=010", r":\d+: has '010' in section \[1000\]"),
+        ("VendorNumber=0x99", "VendorNumber=0x9Z", r":\d+: has '0x9Z' in section \[deviceinfo\]"),
+    ],
+)
+def test_a_value_that_is_compared_and_no_number_is_named_with_its_line(tmp_path, old, new, told) -> None:
+    text = changed(old, new)
+    (tmp_path / "encoder.eds").write_text(text)
+    with pytest.raises(FileError, match=told) as refused:
+        read_data_sheet(tmp_path / "encoder.eds")
+    assert text.splitlines()[(refused.value.line or 0) - 1] == new
+
+
+def test_octal_and_decimal_that_are_the_same_number_are_read(tmp_path: Path) -> None:
+    (tmp_path / "encoder.eds").write_text(changed("VendorNumber=0x99", "VendorNumber=001"))
+    assert read_data_sheet(tmp_path / "encoder.eds").values[VENDOR] == 1
+
+
 @hypothesis_settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     place=st.integers(0, len(ABOUT)),

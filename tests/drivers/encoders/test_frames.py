@@ -1,7 +1,7 @@
 """Discovery on a CAN bus: frames of strangers are told, and the node id of the only device is set."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from functools import partial
 
 import can
@@ -18,7 +18,9 @@ from drivers.discovery.encoders import (
     search_bus,
 )
 from drivers.errors import BusError
+from drivers.simulated import slcan
 from drivers.simulated.encoders.can_bus import PeriodicAction, SimulatedCanBus
+from drivers.simulated.serial_line import PtyLine
 from hexacell.errors import DeviceError
 from tests.drivers.encoders.conftest import LSS_REQUEST
 
@@ -99,6 +101,42 @@ def test_a_bus_of_another_bit_rate_is_told() -> None:
         found = search_bus({"interface": "virtual", "channel": channel}, QUICK)
     assert "error frames within 1 s" in found.problem
     assert "try another bit rate" in found.problem
+
+
+class CanableAdapter(slcan.SlcanAdapter):
+    """Acknowledges nothing, and takes a lone line end for the command before."""
+
+    version, latest = b"b158aa7 github.com/normaldotcom/canable2-fw.git", ""
+
+    def answer(self, command: str) -> bytes:
+        self.latest = command or self.latest
+        super().answer(self.latest)
+        return self.version + b"\r" if self.latest == "V" else b""
+
+
+@pytest.mark.parametrize(
+    ("version", "is_one"),
+    [
+        (CanableAdapter.version, True),
+        (b"0c1d2e3f4-dirty git@example.org:maker/slcan", True),
+        (b"CANtact v1.3", True),
+        (b"\aV0100", True),
+        (b"error:20", False),
+        (b"Unknown command: V", False),
+    ],
+)
+async def test_adapters_of_other_makers_are_found_and_used(
+    raw, make_bank, monkeypatch, version, is_one
+) -> None:
+    monkeypatch.setattr(slcan, "SlcanAdapter", CanableAdapter)
+    monkeypatch.setattr(CanableAdapter, "version", version)
+    with closing(slcan.SlcanServer(raw.channel, PtyLine("adapter"))) as server:
+        assert encoders.speaks_slcan(server.bus_settings["channel"], QUICK) is is_one
+        if version == b"b158aa7 github.com/normaldotcom/canable2-fw.git":
+            bank = make_bank(bus=server.bus_settings)
+            await bank.open()
+            assert (await bank.read()).counts[5] == 6000
+            await bank.close()
 
 
 @pytest.mark.parametrize("number", [0x000, 0x080, 0x100])

@@ -98,6 +98,20 @@ async def test_a_file_that_does_not_fit_is_told(settings, dbc_file, wire, text, 
         await DbcBank(settings(wire.settings, signals=signals)).open()
 
 
+OVERLAPPING = ' SG_ Again : 16|8@1+ (1,0) [0|255] "" PC\n'
+
+
+async def test_only_messages_that_are_used_must_not_contradict_themselves(settings, dbc_file, wire):
+    other = f'BO_ 999 OTHER: 4 ENC\n SG_ Whole : 0|32@1- (1,0) [0|0] "" PC\n{OVERLAPPING}'
+    dbc_file.write_text(dbc_text() + other, encoding="utf-8-sig")
+    bank = DbcBank(settings(wire.settings))
+    await while_sending(wire, bank.open)
+    await bank.close()
+    dbc_file.write_text(dbc_text() + OVERLAPPING)
+    with pytest.raises(FileError, match=r"The signals \w+ and \w+ are overlapping in message ENC6\."):
+        await DbcBank(settings(wire.settings)).open()
+
+
 async def test_metres_become_millimetres(settings, dbc_file, wire):
     dbc_file.write_text(dbc_text("m"))
     bank = DbcBank(settings(wire.settings))

@@ -13,11 +13,15 @@ from drivers.interfaces import DeviceIdentity, EncoderSample
 from drivers.wire_trace import TraceRecorder
 from drivers.worker_thread import WorkerThread
 from hexacell.cell.devices import EncoderSettings
-from hexacell.errors import DeviceError
+from hexacell.errors import DeviceError, HexacellError
+from hexacell.kinematics.parameters import JointUnit
 
 NEGATIVE = 1 << 31
 MARGIN = 1.0
 """How far a joint may move beside its largest speed, in its unit: samples may follow each other at once."""
+
+BEGINS_ANEW = "Set its preset so that it does not begin anew within the travel, then calibrate"
+JUMPED = "Look for a loose scale, magnet or cable, and at largest_speed_mm_s, then measure again"
 
 _log = logging.getLogger("drivers.encoders")
 
@@ -96,8 +100,14 @@ class BankSession(ABC):
             farthest = MARGIN + speed * (now - before_s)
             for subject, one, other in zip(self.subjects, before, positions, strict=True):
                 if abs(other - one) > farthest:
-                    where = f"from {one:.3f} to {other:.3f} {self._settings.unit}"
-                    raise invalid_sample(f"jumped {where} in {now - before_s:.2g} s", subject)
+                    unit, action = self._settings.unit, JUMPED
+                    sizes = {"one turn": 360.0} if unit is JointUnit.DEG else {}
+                    sizes |= {f"{bits} bits": self._settings.step * 2**bits for bits in range(10, 33)}
+                    problem = f"jumped from {one:.3f} to {other:.3f} {unit} in {now - before_s:.2g} s"
+                    for what, size in sizes.items():
+                        if size > 2 * farthest and abs(abs(other - one) - size) <= farthest:
+                            problem, action = f"{problem}, as {what} that begin anew", BEGINS_ANEW
+                    raise invalid_sample(problem, subject, action)
         self._latest_sample = now, positions
 
 
@@ -117,6 +127,7 @@ class ThreadedBank(Generic[Session]):
         self._trace = trace
         self._worker: WorkerThread | None = None
         self._session: Session | None = None
+        self._failure: HexacellError | None = None
 
     async def open(self) -> tuple[DeviceIdentity, ...]:
         """The identities, legs 1 to 6, of the connected encoders.
@@ -128,6 +139,7 @@ class ThreadedBank(Generic[Session]):
         try:
             identities = await self._worker.run(partial(self._open, self._worker.closing))
         except BaseException as error:
+            self._failure = error if isinstance(error, HexacellError) else None
             _log.warning("cannot be opened: %s", error)
             await self.close()
             raise
@@ -137,7 +149,9 @@ class ThreadedBank(Generic[Session]):
     async def read(self) -> EncoderSample:
         """One complete sample of all six."""
         if self._worker is None or self._session is None:
-            raise DeviceError("are not open", subject="encoders", action="Open them first")
+            why = "" if self._failure is None else f": {self._failure.cause}"
+            action = (self._failure and self._failure.action) or "Open them first"
+            raise DeviceError(f"are not open{why}", subject="encoders", action=action)
         try:
             return await self._worker.run(self._session.read)
         except DeviceError as error:

@@ -26,6 +26,20 @@ JOIN_TIMEOUT_S = 1.0
 ERROR_FRAMES, ERROR_FRAMES_S = 20, 1.0
 """So many error frames within this time are a failure; single ones are repeated by the adapter."""
 
+NUMBERED_AS_LINUX = frozenset({"socketcan", "gs_usb", "virtual"})
+FAULTS = {0x40: "bus off", 0x20: "nobody acknowledges", 0x88: "damaged frames", 0x04: "many errors"}
+"""By bits in the identifier of an error frame of these interfaces (linux/can/error.h)."""
+NO_FRAME = "what comes from it is no frame"
+PLUG_IN = "Plug the CAN adapter in, or correct `bus` under [encoders] in the cell file"
+CHECK_BUS = "Check the CAN adapter, its cable, supply, bit rate and termination"
+ADVICE = {
+    "Permission denied": "Give this user the right to use it (docs/howto-host.md)",
+    "busy": "End the other program that uses it",
+    "Network is down": "Switch the CAN interface on (docs/howto-host.md)",
+    NO_FRAME: "End other programs that read this port, and plug the adapter into a USB port of its own",
+}
+"""What to do, by what is in the message of a failure."""
+
 # Failures are raised as errors; without a handler canopen would also print them.
 logging.getLogger("canopen").addHandler(logging.NullHandler())
 
@@ -37,7 +51,7 @@ class EncoderBus:
     thread must see. ``accepts`` says which frames they get, by default those of CANopen. ``health_check``
     is called at every wake-up and raises if the wait cannot succeed. ``trace`` gets every frame in the
     format of candump: ``181#00C40900``. Every failure of the bus is a ``BusError``; a wait also raises what
-    ``health_check`` does.
+    ``health_check`` does. ``reported`` is what the adapter said of the bus at last.
     """
 
     def __init__(
@@ -56,6 +70,7 @@ class EncoderBus:
         self._accepts = accepts or is_canopen
         self._failure: Exception | None = None
         self._error_frames: deque[float] = deque(maxlen=ERROR_FRAMES)
+        self.reported, self._numbers_as_linux = "", settings.get("interface") in NUMBERED_AS_LINUX
         self._closing = threading.Event()
         self._bus = self._connect(settings)
         self.network = _Network(self._bus, self._send)
@@ -104,19 +119,22 @@ class EncoderBus:
             return can.Bus(**settings)
         except Exception as error:  # the interfaces of python-can raise errors of any class
             raise BusError(
-                f"cannot be opened: {_text(error)}",
-                subject=self.name,
-                action="Plug the CAN adapter in, or correct `bus` under [encoders] in the cell file",
+                f"cannot be opened: {_text(error)}", subject=self.name, action=_advice(error, PLUG_IN)
             ) from error
 
     def _receive(self) -> None:
         try:
             while not self._closing.is_set():
-                message = self._bus.recv(SLICE_S)
+                try:
+                    message = self._bus.recv(SLICE_S)
+                except ValueError as error:  # python-can's slcan: a frame that lost bytes on USB
+                    self._count_fault(f"{NO_FRAME} ({error})")
+                    continue
                 if message is None:
                     continue
                 if message.is_error_frame:
-                    self._count_error_frame()
+                    bits = message.arbitration_id if self._numbers_as_linux else 0
+                    self._count_fault(", ".join(name for bit, name in FAULTS.items() if bits & bit))
                 elif self._accepts(message):
                     with self.condition:
                         self._record(TrafficDirection.RECEIVED, message)
@@ -126,12 +144,15 @@ class EncoderBus:
                 self._failure = error
                 self.condition.notify_all()
 
-    def _count_error_frame(self) -> None:
+    def _count_fault(self, what: str) -> None:
         """Raise if there were too many lately: the receiving thread ends, and the bus has failed."""
+        self.reported = f"; the adapter reports: {what}" if what else ""
         self._error_frames.append(time.monotonic())
         is_many = len(self._error_frames) == ERROR_FRAMES
         if is_many and self._error_frames[-1] - self._error_frames[0] <= ERROR_FRAMES_S:
-            raise can.CanError(f"{ERROR_FRAMES} error frames within {ERROR_FRAMES_S:g} s")
+            raise can.CanError(f"{ERROR_FRAMES} error frames within {ERROR_FRAMES_S:g} s{self.reported}")
+        if FAULTS[0x40] in what:
+            raise can.CanError(f"it gave up after many errors{self.reported}")
 
     def _send(self, message: can.Message) -> None:
         self._record(TrafficDirection.SENT, message)
@@ -151,8 +172,8 @@ class EncoderBus:
         return BusError(
             f"{what}: {_text(cause)}",
             subject=self.name,
-            action="Check the CAN adapter, its cable, supply and termination, then open the encoders "
-            "again; the set that was being measured is void",
+            action=f"{_advice(cause, CHECK_BUS)}, then open the encoders again; the set that was being "
+            "measured is void",
         )
 
 
@@ -175,6 +196,10 @@ class _Network(canopen.Network):
 def is_canopen(message: can.Message) -> bool:
     """Whether it is a data frame with an 11-bit id, sent by another participant."""
     return message.is_rx and not (message.is_remote_frame or message.is_extended_id)
+
+
+def _advice(error: Exception, usual: str) -> str:
+    return next((advice for words, advice in ADVICE.items() if words in _text(error)), usual)
 
 
 def _text(error: Exception) -> str:

@@ -6,7 +6,6 @@ The SDO client can be interrupted, and detects a second device under the same no
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TypeVar
 
 from canopen.objectdictionary import ObjectDictionary
 from canopen.sdo.client import SdoClient
@@ -22,8 +21,6 @@ ABSENT = frozenset({0x0602_0000, 0x0609_0011})
 """The abort codes that mean that there is no such entry: no object, no subindex (CiA 301)."""
 TIMES_ASKED, PAUSE_S = 4, 0.1
 """How often a device is asked that refuses for another reason, which may pass, and the pause between."""
-
-Transferred = TypeVar("Transferred")
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,8 +81,15 @@ class EncoderNode:
 
     def read_optional(self, entry: ObjectEntry) -> int | None:
         """The value of an entry; None if the device says that it does not have it."""
+
+        def upload() -> int:
+            data = self.sdo.upload(entry.index, entry.subindex)
+            # Four bytes without a size may have others behind the entry's own.
+            is_unsized = self.sdo.latest[0] & _SIZE_BITS == _EXPEDITED
+            return int.from_bytes(data[: entry.size] if is_unsized else data, "little")
+
         try:
-            return self._asked(entry, lambda: self.sdo.value_of(entry))
+            return self._asked(entry, upload)
         except SdoAbortedError as error:
             if error.code in ABSENT:
                 return None
@@ -104,28 +108,32 @@ class EncoderNode:
         except SdoAbortedError as error:
             raise setting_refused(f"refuses to set {entry} to {value:#x}: {error}", self.leg) from error
 
-    def _asked(
-        self, entry: ObjectEntry, transfer: Callable[[], Transferred], times: int = TIMES_ASKED
-    ) -> Transferred:
+    def _asked(self, entry: ObjectEntry, call: Callable[[], int | None], times: int = 1) -> int | None:
         """What a transfer gives, or ``SdoAbortedError``: that of the last time, unless it means absence."""
         try:
-            return transfer()
+            return call()
         except SdoAbortedError as error:
-            if times == 1 or error.code in ABSENT:
+            if times == TIMES_ASKED or error.code in ABSENT:
                 raise
         except SdoCommunicationError as error:
             raise self._communication_error(entry, error) from error
         self._bus.listen(PAUSE_S)
-        return self._asked(entry, transfer, times - 1)
+        return self._asked(entry, call, times + 1)
 
     def check_alone(self) -> None:
         """Raise if a second device responded under this node id."""
         if self.sdo.has_surplus_response:
             raise duplicated_node("responded twice to one request", self.leg)
 
-    def _communication_error(self, entry: ObjectEntry, error: Exception) -> SilentNodeError:
+    def _communication_error(self, entry: ObjectEntry, error: Exception) -> DeviceError:
         self.check_alone()
-        return silent_encoder(f"does not respond for {entry}: {error}", self.leg.subject)
+        if not self.sdo.latest:
+            return silent_encoder(f"does not respond for {entry}: {error}", self.leg.subject)
+        return DeviceError(
+            f"does not respond as it should for {entry}, but {self.sdo.latest.hex(' ')}: {error}",
+            subject=self.leg.subject,
+            action="End other programs that ask it, then open the encoders again, or use another device",
+        )
 
 
 def setting_refused(what: str, leg: Leg) -> DeviceError:
@@ -144,16 +152,36 @@ def duplicated_node(what: str, leg: Leg) -> DeviceError:
     )
 
 
-def silent_nodes(what: str, legs: Sequence[Leg], *, all_legs: bool) -> SilentNodeError:
-    """The error for legs whose encoders are silent, or those of all legs."""
-    of_all = ("the CAN adapter, supply and termination",) if all_legs else ()
-    return silent_encoder(what, subject_of(legs), *of_all)
+THE_BUS = "the CAN adapter, supply and termination"
+
+
+def explained(error: SilentNodeError, nodes: Sequence[EncoderNode], bus: EncoderBus) -> SilentNodeError:
+    """The error with all that are silent now, and advice that fits to those that answer.
+
+    Raises ``BusError`` if the bus itself has failed, which explains all.
+    """
+    health_check, bus.health_check = bus.health_check, lambda: None  # it would raise the same again
+    try:
+        for node in nodes:
+            node.sdo.probe()
+        bus.wait_for(lambda: all(node.sdo.has_responded for node in nodes), nodes[0].sdo.timeout_s)
+    finally:
+        bus.health_check = health_check
+    named = [node.leg for node in nodes if str(node.leg) in (error.subject or "")]
+    silent = [node.leg for node in nodes if not node.sdo.has_responded]
+    if len(silent) == len(nodes):
+        what = f"{error.problem}; no encoder answers{bus.reported}"
+        return silent_encoder(what, subject_of(silent), THE_BUS)
+    if set(named) & set(silent):
+        return silent_encoder(f"{error.problem}; the others answer", subject_of(silent))
+    check = THE_BUS if len(named) == len(nodes) else "its supply for a dip, by which settings are lost"
+    return silent_encoder(f"{error.problem}, but SDO requests are answered", subject_of(named), check)
 
 
 SDO_REQUEST = 0x600
 SDO_RESPONSE = 0x580
-_IS_SIZED, _IS_EXPEDITED = 1, 2
-"""Bits of the first byte of a response: it states how many bytes there are; they are in it."""
+_SIZE_BITS, _EXPEDITED = 3, 2
+"""Of the first byte of a response: its value is in it, and without the other bit not its size."""
 _UPLOAD_DEVICE_TYPE = bytes((0x40, 0x00, 0x10, 0, 0, 0, 0, 0))
 
 
@@ -164,7 +192,7 @@ class CountingSdoClient(SdoClient):
     response or it is an abort.
 
     ``has_responded``: there was a response; ``has_surplus_response``: there were more than requests, so two
-    devices share the node id.
+    devices share the node id; ``latest`` is what came since the latest request, of whatever length.
     """
 
     RESPONSE_TIMEOUT = 0.0  # read_response waits before canopen does
@@ -176,30 +204,23 @@ class CountingSdoClient(SdoClient):
         self.has_surplus_response = False
         self.has_responded = False
         self._bus = bus
-        self._timeout_s = timeout_s
+        self.timeout_s = timeout_s
         self._outstanding = 0
-        self._latest = bytes(8)
+        self.latest = b""
         bus.network.subscribe(self.tx_cobid, self.on_response)
-
-    def value_of(self, entry: ObjectEntry) -> int:
-        """The value of an entry, unsigned.
-
-        An expedited response without its size has four bytes: those beyond the entry's are not its own.
-        """
-        data = self.upload(entry.index, entry.subindex)
-        is_sized = self._latest[0] & _IS_SIZED or not self._latest[0] & _IS_EXPEDITED
-        return int.from_bytes(data if is_sized else data[: entry.size], "little")
 
     def probe(self) -> None:
         """Request the device type without waiting; a response sets ``has_responded``."""
+        self.has_responded, self.latest = False, b""
         self._outstanding += 1
         self.send_request(_UPLOAD_DEVICE_TYPE)  # type: ignore[no-untyped-call]
 
     def on_response(self, can_id: int, data: bytearray, timestamp: float) -> None:
         """Handle a received response; a frame that is too short is ignored."""
+        self.latest = bytes(data)
         if len(data) != 8:
             return
-        self.has_responded, self._latest = True, bytes(data)
+        self.has_responded = True
         self._outstanding -= 1
         self.has_surplus_response = self.has_surplus_response or self._outstanding < 0
         super().on_response(can_id, data, timestamp)  # type: ignore[no-untyped-call]
@@ -207,14 +228,14 @@ class CountingSdoClient(SdoClient):
 
     def request_response(self, sdo_request: bytes) -> bytes:
         """Send one request and return its response, after any outstanding earlier one."""
-        self._bus.wait_for(lambda: self._outstanding <= 0, self._timeout_s)
+        self._bus.wait_for(lambda: self._outstanding <= 0, self.timeout_s)
         with self._bus.condition:
-            self._outstanding = 1
+            self._outstanding, self.latest = 1, b""
         response: bytes = super().request_response(sdo_request)  # type: ignore[no-untyped-call]
         return response
 
     def read_response(self) -> bytes:
         """Wait for the response."""
-        self._bus.wait_for(lambda: not self.responses.empty(), self._timeout_s)
+        self._bus.wait_for(lambda: not self.responses.empty(), self.timeout_s)
         response: bytes = super().read_response()  # type: ignore[no-untyped-call]
         return response

@@ -8,10 +8,11 @@ from typing import ClassVar
 from drivers.encoders import node_identity
 from drivers.encoders.bank import BankSession, ThreadedBank, bus_settings
 from drivers.encoders.can_bus import EncoderBus
-from drivers.encoders.canopen_node import EncoderNode, Leg, NmtCommand
+from drivers.encoders.canopen_node import EncoderNode, Leg, NmtCommand, explained
 from drivers.encoders.node_monitor import AlarmPoll, AlarmTiming, NodeMonitor, check_nodes
 from drivers.encoders.object_dictionary import DeviceType
 from drivers.encoders.sync_sampling import SyncSampler, configure_position_tpdo, follow_plain_sync
+from drivers.errors import SilentNodeError
 from drivers.interfaces import DeviceIdentity
 from drivers.wire_trace import TraceRecorder
 from hexacell.cell.devices import EncoderSettings
@@ -38,17 +39,26 @@ class EncoderSession(BankSession):
 
     def _sample(self) -> tuple[int, ...]:
         """The counts of one SYNC; valid only if no fault is found after it."""
-        self.bus.check()
-        self._alarms.begin_sample()
-        counts = self._sampler.sample()
-        self._alarms.check()
-        self.bus.check()
+        try:
+            self.bus.check()
+            self._alarms.begin_sample()
+            counts = self._sampler.sample()
+            self._alarms.check()
+            self.bus.check()
+        except SilentNodeError as error:
+            raise explained(error, self._nodes, self.bus) from error
         return counts
 
     def start(self) -> None:
         """Configure all nodes, and start them together."""
-        settings, legs = self._settings, self._legs
-        nodes = tuple(EncoderNode(leg, self.bus, settings.timeout_s) for leg in legs)
+        self._nodes = tuple(EncoderNode(leg, self.bus, self._settings.timeout_s) for leg in self._legs)
+        try:
+            self._start()
+        except SilentNodeError as error:
+            raise explained(error, self._nodes, self.bus) from error
+
+    def _start(self) -> None:
+        settings, legs, nodes = self._settings, self._legs, self._nodes
         for node in nodes:
             node.command(NmtCommand.ENTER_PRE_OPERATIONAL)
         node_identity.detect_nodes(nodes, self.bus, settings.timeout_s)

@@ -17,7 +17,8 @@ import can
 
 from drivers.encoders.bank import BankSession, ThreadedBank, bus_settings
 from drivers.encoders.can_bus import EncoderBus
-from drivers.errors import invalid_sample, optional, silent_encoder
+from drivers.encoders.canopen_node import THE_BUS
+from drivers.errors import SilentNodeError, invalid_sample, optional, silent_encoder
 from drivers.interfaces import DeviceIdentity
 from drivers.wire_trace import TraceRecorder
 from hexacell.cell.described_devices import DbcSettings
@@ -150,6 +151,7 @@ class DbcSession(BankSession):
         self._frames = {signal.frame for signal in self._signals}
         super().__init__(settings, [signal.subject for signal in self._signals])
         self._latest: dict[int, _Received] = {}
+        self._hears_others = False
         self.identities = tuple(
             DeviceIdentity(
                 f"encoder of leg {one.leg}",  # such encoders have no names of their own
@@ -173,6 +175,7 @@ class DbcSession(BankSession):
 
     def _accepts(self, message: can.Message) -> bool:
         frame = FrameId(message.arbitration_id, message.is_extended_id)
+        self._hears_others = self._hears_others or frame not in self._frames
         return message.is_rx and not message.is_remote_frame and frame in self._frames
 
     def _receiver(self, frame: FrameId) -> Callable[[int, bytearray, float], None]:
@@ -217,12 +220,8 @@ class DbcSession(BankSession):
             if signal.leg in fresh and fresh[signal.leg].problem:
                 action = "Remove the cause, or correct [encoders.dbc], then measure again"
                 raise invalid_sample(fresh[signal.leg].problem, signal.subject, action)
-        for signal in self._signals:
-            if signal.leg not in fresh:
-                check = "its supply and cable, and the message in the DBC file"
-                raise silent_encoder(
-                    f"sends nothing for {self._settings.timeout_s:g} s", signal.subject, check
-                )
+        if silent := [signal for signal in self._signals if signal.leg not in fresh]:
+            raise self._silence(silent)
         if not complete:
             times = [one.at_s for one in latest.values()]
             raise DeviceError(
@@ -232,6 +231,15 @@ class DbcSession(BankSession):
                 action="Let them send more often or on a request, or correct window_s in [encoders.dbc]",
             )
         return tuple(round(latest[signal.leg].position / self._settings.step) for signal in self._signals)
+
+    def _silence(self, silent: list[PositionSignal]) -> SilentNodeError:
+        """The error for encoders that send nothing, by what else is on the bus."""
+        what = f"sends nothing for {self._settings.timeout_s:g} s{self._bus.reported}"
+        if len(silent) < len(self._signals):
+            check = "its supply and cable, and the message in the DBC file"
+            return silent_encoder(f"{what}; others do", ", ".join(one.subject for one in silent), check)
+        check = "the messages in the DBC file" if self._hears_others else f"{THE_BUS}, and the bit rate"
+        return silent_encoder(what + ", but others do" * self._hears_others, "each encoder", check)
 
     def _ask(self) -> float:
         """Send the request, if there is one; the time from which on frames have later positions."""

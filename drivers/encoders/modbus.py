@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from drivers.encoders.bank import BankSession, ThreadedBank
-from drivers.errors import BusError, PortLost, invalid_sample, silent_encoder
+from drivers.errors import BusError, PortLost, SilentNodeError, invalid_sample, silent_encoder
 from drivers.interfaces import DeviceIdentity
 from drivers.serial.modbus_port import FUNCTIONS, REQUEST, ModbusPort, RefusedRequest
 from drivers.serial.opening import adapter_at
@@ -23,6 +23,7 @@ from hexacell.errors import UsageError
 
 LINE = {"baudrate": 19200, "bytesize": 8, "parity": "E", "stopbits": 1}
 DAMAGED_TRIES = 3
+ALL_SILENT = "the adapter, its supply and cable, and serial in [encoders.modbus]"
 MAX_REGISTERS = 125
 """Registers that one answer can have (Modbus Application Protocol 6.3)."""
 REGISTER_BITS, REGISTER_BYTES = 16, 2
@@ -143,8 +144,14 @@ class ModbusSession(BankSession):
 
     def _read_all(self, spans: Sequence[RegisterSpan]) -> tuple[int, ...]:
         found: dict[int, int] = {}
+        silent: list[SilentNodeError] = []
         for span in spans:
-            found |= counts_in(self._answer(span), span, self._described, signed=self._settings.signed)
+            try:
+                answer = self._answer(span)
+            except SilentNodeError as error:
+                silent.append(error)
+                continue
+            found |= counts_in(answer, span, self._described, signed=self._settings.signed)
             for leg in span.legs:
                 if found[leg] in self._described.invalid:
                     raise invalid_sample(
@@ -152,6 +159,10 @@ class ModbusSession(BankSession):
                         f"encoder of leg {leg}",
                         "Remove the cause, or correct invalid in [encoders.modbus], then measure again",
                     )
+        if len(silent) > 1 and not found:
+            raise silent_encoder(silent[0].problem, "each of the encoders", ALL_SILENT)
+        if silent:
+            raise silent[0]
         return tuple(found[leg] for leg in sorted(found))
 
     def _answer(self, span: RegisterSpan) -> bytes:

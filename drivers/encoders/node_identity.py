@@ -8,7 +8,6 @@ perhaps on purpose.
 
 import math
 import re
-from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -50,10 +49,17 @@ def detect_nodes(nodes: Sequence[EncoderNode], bus: EncoderBus, timeout_s: float
         unexpected = sorted(set(bus.network.scanner.nodes) - {node.leg.node for node in nodes})
         found = ", ".join(map(str, unexpected))
         hint = f"; node {found} is on the bus but belongs to no leg" if unexpected else ""
+        odd = [node for node in missing if node.sdo.latest or node.leg.node in bus.network.scanner.nodes]
+        is_alone = len(missing) == len(nodes) and not (unexpected or odd)
+        where = "the CAN adapter, supply, cable, termination and bit rate" if is_alone else "supply, cable"
+        action = f"Check {where} and node id"
+        if len(odd) == len(missing):
+            hint += "; it sends, but no answer of eight bytes to SDO requests"
+            action = "Switch it off and on; if it stays so, set it with its vendor's tool"
         raise BusError(
-            f"no device responds{hint}",
+            f"no device responds{hint}{bus.reported}",
             subject=subject_of([node.leg for node in missing]),
-            action="Check supply, cable, bit rate and node id",
+            action=action,
         )
 
 
@@ -213,19 +219,16 @@ def read_data_sheet(path: Path) -> DataSheet:
         FileError: it cannot be read, says nothing of what a device is, or a value of these is no number.
     """
     try:
-        data = path.read_bytes()
+        text = path.read_text(encoding="utf-8-sig", errors="replace")  # names may be in any encoding
     except OSError as error:
         raise FileError(
             f"cannot be read: {error.strerror}", subject=path, action="Correct eds under [encoders]"
         ) from error
-    encoding = "utf-16" if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else "utf-8-sig"
-    lines = _lines(data.decode(encoding, errors="replace"))  # names may be in any encoding
-    entries = (*WHAT_IT_IS.values(), *HOW_IT_IS_SET.values())
+    lines, entries = _lines(text), (*WHAT_IT_IS.values(), *HOW_IT_IS_SET.values())
     values = {entry: value for entry in entries if (value := _default(lines, entry, path)) is not None}
     if not values.keys() & WHAT_IT_IS.values():
-        names = ", ".join(f"{name} ({entry})" for name, entry in WHAT_IT_IS.items())
         raise FileError(
-            f"is no EDS file of an encoder: it has none of {names}",
+            f"is no EDS file of an encoder: it has none of {', '.join(WHAT_IT_IS)}",
             subject=path,
             action="Get it from the encoder's maker, or remove eds from [encoders]",
         )
@@ -233,10 +236,10 @@ def read_data_sheet(path: Path) -> DataSheet:
 
 
 _Lines = dict[tuple[str, str], tuple[str, int]]
-"""By section and key, in small letters: the value and its line; by an empty key what has no ``=``."""
 
 
 def _lines(text: str) -> _Lines:
+    """By section and key, in small letters: the value and its line; by an empty key what has no ``=``."""
     section, found = "", _Lines()
     for number, line in enumerate(text.splitlines(), 1):
         words = line.partition(";")[0].strip()

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from canopen.emcy import EmcyError
 
 from drivers.encoders.can_bus import EncoderBus
-from drivers.encoders.canopen_node import EncoderNode, Leg, silent_nodes, subject_of
+from drivers.encoders.canopen_node import EncoderNode, Leg, subject_of
 from drivers.encoders.object_dictionary import ALARMS, ERROR_REGISTER, WARNINGS
-from drivers.errors import RestartedNodeError, invalid_sample
+from drivers.errors import RestartedNodeError, invalid_sample, silent_encoder
 
 HEARTBEAT = 0x700
 EMERGENCY = 0x080
@@ -107,7 +107,7 @@ def check_nodes(monitors: Sequence[NodeMonitor]) -> None:
     silent = [monitor for monitor in monitors if monitor.is_silent(now_s)]
     if silent:
         what = f"no heartbeat for {silent[0].timeout_s:.2g} s"
-        raise silent_nodes(what, [monitor.leg for monitor in silent], all_legs=len(silent) == len(monitors))
+        raise silent_encoder(what, subject_of([monitor.leg for monitor in silent]))
     for monitor in monitors:
         if monitor.emergency is not None:
             action = (_CHECK_BUS,) if monitor.is_about_the_bus else ()

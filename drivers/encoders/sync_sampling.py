@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 from drivers.encoders import object_dictionary as od
 from drivers.encoders.can_bus import EncoderBus
-from drivers.encoders.canopen_node import EncoderNode, Leg, duplicated_node, setting_refused, silent_nodes
+from drivers.encoders.canopen_node import EncoderNode, Leg, duplicated_node, setting_refused, subject_of
 from drivers.encoders.object_dictionary import DeviceType, ObjectEntry
-from drivers.errors import BusError
+from drivers.errors import BusError, silent_encoder
 from hexacell.errors import DeviceError
 
 SYNC = 0x080
@@ -25,8 +25,7 @@ _OFF = 1 << 31
 _NO_RTR = 1 << 30
 _POSITION_BITS = 32
 _SENDS_SYNC = 1 << 30
-_SYNC_SETTING = (1 << 31) - 1
-"""All of 1005h but bit 31, which means nothing."""
+_SYNC_SETTING = (1 << 31) - 1  # bit 31 means nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,8 +86,7 @@ def configure_position_tpdo(node: EncoderNode, kind: DeviceType, heartbeat_ms: i
         raise DeviceError(
             f"has no heartbeat ({od.PRODUCER_HEARTBEAT})",
             subject=node.leg.subject,
-            action="Write `heartbeat_ms = 0` under [encoders]: that it is silent is then seen at the next "
-            "sample, and not before",
+            action="Write `heartbeat_ms = 0` under [encoders]; its silence is then seen at the next sample",
         )
     if heartbeat_ms or heartbeat:
         node.write(od.PRODUCER_HEARTBEAT, heartbeat_ms)
@@ -197,7 +195,7 @@ class SyncSampler:
             return self._received()
         silent = [leg for leg, left in zip(self.legs, self._outstanding, strict=True) if left > 0]
         what = f"no response to SYNC within {self.timeout_s:g} s, {MAX_SYNCS} times"
-        raise silent_nodes(what, silent, all_legs=len(silent) == len(self.legs))
+        raise silent_encoder(what, subject_of(silent))
 
     def check(self) -> None:
         """Raise if a leg sent more positions than there were SYNCs, or another master sends SYNC."""

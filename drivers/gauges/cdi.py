@@ -27,8 +27,6 @@ UNITS = {b"IN": Unit.INCH, b"MM": Unit.MM}
 UNIT_NUMBERS = {1: Unit.INCH, 2: Unit.MM}
 MODES = {0: "ABS", 1: "TIR", 2: "INCR"}
 OUT_OF_BOUNDS = b"OUT OF BOUNDS\r"
-SILENCES = 2
-"""So many mean that it knows no parameters: the answer to one may have been lost."""
 UNKNOWN_PARAMETER = (b"NOT FOUND\r", b"NO ACCESS\r")
 
 
@@ -90,7 +88,7 @@ class CdiGauge(SerialGauge):
         """Its value; None if the instrument does not have it, or knows no parameters at all."""
         if self._knows_parameters is False:
             return None
-        for _ in range(SILENCES):
+        for _ in range(2):  # the answer to one may have been lost
             try:
                 value = await self._query(
                     b"?p%03d\r" % parameter, partial(parse_parameter, parameter=parameter)

@@ -39,13 +39,10 @@ EXCEPTIONS = {
     4: "device failure",
     5: "acknowledged, takes long",
     6: "device busy",
-    10: "gateway without a path",
     11: "no answer to the gateway",
 }
-NOT_THERE = frozenset({2, 3})
-"""Those that mean that there are no such registers, or not so many in one answer."""
-WRONG_REQUEST = frozenset({1, *NOT_THERE})
-BUSY = frozenset({5, 6})
+NOT_THERE, BUSY = (2, 3), (5, 6)
+"""Those that mean that there are no such registers, or not so many in one answer; those that pass."""
 TIMES_ASKED, PAUSE_S = 4, 0.1
 """How often a busy device is asked, and the pause between."""
 LINE_KEYS = ("baudrate", "bytesize", "parity", "stopbits")
@@ -102,7 +99,14 @@ class ModbusPort(RequestPort):
                 break
             self.closing.wait(PAUSE_S)
         if answer.isError():
-            raise self._refused(device, answer.exception_code)
+            code = answer.exception_code
+            refused = RefusedRequest(
+                f"device {device} answers exception {code} ({EXCEPTIONS.get(code, 'of its maker')})",
+                subject=self.subject,
+                action="Correct device, kind and register in the cell file, or look it up in the manual",
+            )
+            refused.is_absence = code in NOT_THERE
+            raise refused
         frame_bytes = FRAME_BYTES + REGISTER_BYTES * count
         if len(answer.registers) != count or not self._is_alone(frame_bytes):
             self._must_clear = True  # one of several frames, of which nobody knows which is the answer
@@ -120,17 +124,6 @@ class ModbusPort(RequestPort):
         if client is not None:
             with suppress(OSError, termios.error):
                 client.close()
-
-    def _refused(self, device: int, code: int) -> RefusedRequest:
-        refused = RefusedRequest(
-            f"device {device} answers exception {code} ({EXCEPTIONS.get(code, 'of its maker')})",
-            subject=self.subject,
-            action="Correct device, kind and register of modbus in the cell file"
-            if code in WRONG_REQUEST
-            else "It answers, so cable and address are right: look the exception up in its manual",
-        )
-        refused.is_absence = code in NOT_THERE
-        return refused
 
     def _next_bytes(self, _size: int | None) -> bytes:
         """What comes until the line pauses; nothing if nothing comes in time."""

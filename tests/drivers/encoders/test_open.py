@@ -121,12 +121,13 @@ async def test_a_device_that_fits_is_used(raw, bank, objects):
         ({"refuses": {(0x1801, 2): 0x0601_0002}}, r"object 1801h:2 to 0x1.*read only"),
         ({"forgets": {(0x1801, 2)}}, "acknowledges"),
         ({"forgets": {(0x1801, 1)}}, "acknowledges"),
+        ({"forgets": {(0x1005, 0)}}, "acknowledges, but does not keep, object 1005h:0"),
         ({"refuses": {(0x1019, 0): 0x0800_0022}}, r"refuses to set object 1019h:0 to 0x0.*vendor's tool"),
     ],
 )
 async def test_a_node_that_answers_wrongly_is_named(raw, bank, fault, error):
     node = raw.nodes[4]
-    change(node, {(0x1801, 2): "fe", (0x1801, 1): "84020080", (0x1019, 0): "f0"})
+    change(node, {(0x1801, 2): "fe", (0x1801, 1): "84020080", (0x1019, 0): "f0", (0x1005, 0): "90000000"})
     for name, value in fault.items():
         setattr(node, name, value)
     with pytest.raises(DeviceError, match=rf"leg 4 \(node 4\).*{error}"):

@@ -55,6 +55,19 @@ async def test_one_that_is_silent_from_the_start_is_named(settings, wire):
         await while_sending(wire, bank.open, without=5)
 
 
+@pytest.mark.parametrize(
+    ("frame", "told"), [(None, "CAN adapter.*bit rate"), (0x700, "but others do.*DBC")]
+)
+async def test_a_bus_without_any_encoder_is_told_and_not_the_first_leg(settings, wire, frame, told):
+    bank = DbcBank(settings(wire.settings))
+    opening = asyncio.create_task(bank.open())
+    while frame and not (bank._session and bank._session._hears_others):
+        wire.send(frame, b"")
+        await asyncio.sleep(0)
+    with pytest.raises(SilentNodeError, match=f"^each encoder: sends nothing .*{told}"):
+        await opening
+
+
 async def test_frames_of_another_length_are_no_positions(settings, wire):
     bank = DbcBank(settings(wire.settings))
     with pytest.raises(InvalidSampleError, match="sends 5 bytes, where the DBC file has 6"):

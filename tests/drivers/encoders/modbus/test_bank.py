@@ -215,6 +215,14 @@ def refusing(monkeypatch):
     return begin
 
 
+async def test_a_line_on_which_nothing_answers_is_told_and_not_its_first_device(simulated):
+    cell = simulated(latch=LATCH, timeout_s=0.05, **TWO_DEVICES)
+    cell.bank.faults(1)["silent"](on=True)
+    cell.bank.faults(4)["silent"](on=True)
+    with pytest.raises(SilentNodeError, match=r"^each of the encoders: does not answer.*the adapter"):
+        await cell.driver.open()
+
+
 async def test_a_busy_device_is_asked_again(simulated, refusing):
     cell = simulated()
     refusing(6, times=3)
@@ -228,7 +236,7 @@ async def test_no_exception_but_of_absence_means_that_registers_are_not_there(
 ):
     cell = simulated(registers=(0, 10, 20, 30, 40, 50))
     asked = refusing(code)
-    with pytest.raises(RefusedRequest, match=rf"answers exception {code} .*look the exception up"):
+    with pytest.raises(RefusedRequest, match=rf"answers exception {code} .*look it up"):
         await cell.driver.open()
     assert {command[2:6] for command in asked} == {bytes.fromhex("00 00 00 34")}
     assert len(asked) == times

@@ -1,0 +1,92 @@
+"""A message of silent or jumping encoders names the cause that is known, and advice that fits to it."""
+
+import can
+import pytest
+
+from drivers.encoders.can_bus import EncoderBus
+from drivers.errors import BusError, InvalidSampleError, SilentNodeError
+from hexacell.errors import DeviceError
+from tests.drivers.encoders.conftest import short_timeout
+
+
+@pytest.mark.parametrize(
+    ("nodes", "told"),
+    [
+        (
+            (4,),
+            r"^encoder of leg 4 \(node 4\): no response .*the others answer\. Check its supply and cable,",
+        ),
+        ((2, 4), r"^encoders of leg 2 .* leg 4 .*the others answer"),
+        (
+            range(1, 7),
+            r"leg 1 .* leg 6 .*no encoder answers\. Check the CAN adapter, supply and termination",
+        ),
+    ],
+)
+async def test_all_that_are_silent_are_told_and_whether_others_answer(raw, make_bank, nodes, told):
+    bank = make_bank(timeout_s=1.0)
+    await bank.open()
+    bank._session._nodes[0].sdo.timeout_s = 0.1
+    for node in nodes:
+        raw.nodes[node].answers_sync, raw.nodes[node].answers_sdo = (lambda _: []), 0
+    with short_timeout(bank), pytest.raises(SilentNodeError, match=told):
+        await bank.read()
+
+
+@pytest.mark.parametrize("left", [1, 0])
+async def test_a_bus_without_a_node_is_not_told_as_six_cables(raw, make_bank, left):
+    for node in range(1 + left, 7):
+        del raw.nodes[node]
+    told = "Check supply, cable and" if left else "Check the CAN adapter, .*bit rate and node id"
+    with pytest.raises(BusError, match=told):
+        await make_bank(timeout_s=0.3).open()
+
+
+@pytest.mark.parametrize("kind", ["short", "heartbeat"])
+async def test_a_node_that_sends_but_does_not_answer_is_told_so(raw, make_bank, kind):
+    answer = raw.nodes[3].answer_sdo
+    raw.nodes[3].answer_sdo = lambda request: answer(request)[:5]
+    if kind == "heartbeat":
+        raw.nodes[3].answer_sdo = lambda request: raw.send(0x703, b"\x7f") or b""
+    with pytest.raises(BusError, match=r"leg 3 .*sends, but no answer of eight.*Switch it off"):
+        await make_bank(timeout_s=0.3).open()
+
+
+async def test_encoders_that_could_not_be_opened_say_why(raw, make_bank):
+    del raw.nodes[3]
+    bank = make_bank(timeout_s=0.3)
+    for call, error in ((bank.open, BusError), (bank.read, DeviceError)):
+        with pytest.raises(error, match=r"leg 3 \(node 3\): no device responds\. Check supply, cable and"):
+            await call()
+
+
+@pytest.mark.parametrize(("change", "told"), [(-(2**24), "24 bits that.*preset"), (9**7, "loose")])
+async def test_a_count_that_begins_anew_is_no_weak_magnet(raw, make_bank, change, told):
+    bank = make_bank(largest_speed=1.0)
+    await bank.open()
+    await bank.read()
+    raw.nodes[3].counts += change
+    with pytest.raises(InvalidSampleError, match=rf"leg 3 .*jumped .*{told}"):
+        await bank.read()
+
+
+@pytest.mark.parametrize(
+    ("fault", "told"),
+    [
+        (can.Message(is_error_frame=True, arbitration_id=0x20), "nobody acknowledges.*bit rate"),
+        (can.Message(is_error_frame=True, arbitration_id=0x40), "gave up .*bus off"),
+        (ValueError("non-hexadecimal number found"), "no frame .*End other programs that read this port"),
+        (can.CanOperationError("Network is down"), "Switch the CAN interface on"),
+    ],
+)
+async def test_what_the_adapter_reports_is_told(raw, opened, monkeypatch, fault, told):
+    def recv(_timeout_s):
+        if isinstance(fault, Exception):
+            raise fault
+        return fault
+
+    bus: EncoderBus = opened._session.bus
+    monkeypatch.setattr(bus.network.bus, "recv", recv)
+    bus._receiver.join(5.0)
+    with pytest.raises(BusError, match=told):
+        await opened.read()

@@ -21,7 +21,7 @@ MARGIN = 1.0
 """How far a joint may move beside its largest speed, in its unit: samples may follow each other at once."""
 
 BEGINS_ANEW = "Set its preset so that it does not begin anew within the travel, then calibrate"
-JUMPED = "Look for a loose scale, magnet or cable, and at largest_speed_mm_s, then measure again"
+JUMPED = "See what changed (preset, direction, scale, cable, largest_speed_mm_s), then measure again"
 
 _log = logging.getLogger("drivers.encoders")
 
@@ -150,7 +150,7 @@ class ThreadedBank(Generic[Session]):
         """One complete sample of all six."""
         if self._worker is None or self._session is None:
             why = "" if self._failure is None else f": {self._failure.cause}"
-            action = (self._failure and self._failure.action) or "Open them first"
+            action = "Open them first" if self._failure is None else f"{self._failure.action}"
             raise DeviceError(f"are not open{why}", subject="encoders", action=action)
         try:
             return await self._worker.run(self._session.read)

@@ -30,7 +30,6 @@ NUMBERED_AS_LINUX = frozenset({"socketcan", "gs_usb", "virtual"})
 FAULTS = {0x40: "bus off", 0x20: "nobody acknowledges", 0x88: "damaged frames", 0x04: "many errors"}
 """By bits in the identifier of an error frame of these interfaces (linux/can/error.h)."""
 NO_FRAME = "what comes from it is no frame"
-PLUG_IN = "Plug the CAN adapter in, or correct `bus` under [encoders] in the cell file"
 CHECK_BUS = "Check the CAN adapter, its cable, supply, bit rate and termination"
 ADVICE = {
     "Permission denied": "Give this user the right to use it (docs/howto-host.md)",
@@ -118,16 +117,19 @@ class EncoderBus:
         try:
             return can.Bus(**settings)
         except Exception as error:  # the interfaces of python-can raise errors of any class
-            raise BusError(
-                f"cannot be opened: {_text(error)}", subject=self.name, action=_advice(error, PLUG_IN)
-            ) from error
+            action = "Plug the CAN adapter in, or correct `bus` under [encoders] in the cell file"
+            action = _advice(error) or action
+            raise BusError(f"cannot be opened: {_text(error)}", subject=self.name, action=action) from error
 
     def _receive(self) -> None:
         try:
             while not self._closing.is_set():
                 try:
                     message = self._bus.recv(SLICE_S)
-                except ValueError as error:  # python-can's slcan: a frame that lost bytes on USB
+                except (ValueError, can.CanError) as error:  # of python-can's slcan: damage on USB
+                    if not isinstance(error.__cause__ or error, ValueError):
+                        raise
+                    getattr(self._bus, "flush", bool)()  # it would decode the same bytes again
                     self._count_fault(f"{NO_FRAME} ({error})")
                     continue
                 if message is None:
@@ -172,7 +174,7 @@ class EncoderBus:
         return BusError(
             f"{what}: {_text(cause)}",
             subject=self.name,
-            action=f"{_advice(cause, CHECK_BUS)}, then open the encoders again; the set that was being "
+            action=f"{_advice(cause) or CHECK_BUS}, then open the encoders again; the set that was being "
             "measured is void",
         )
 
@@ -198,8 +200,8 @@ def is_canopen(message: can.Message) -> bool:
     return message.is_rx and not (message.is_remote_frame or message.is_extended_id)
 
 
-def _advice(error: Exception, usual: str) -> str:
-    return next((advice for words, advice in ADVICE.items() if words in _text(error)), usual)
+def _advice(error: Exception) -> str | None:
+    return next((advice for words, advice in ADVICE.items() if words in _text(error)), None)
 
 
 def _text(error: Exception) -> str:

@@ -174,7 +174,7 @@ def explained(error: SilentNodeError, nodes: Sequence[EncoderNode], bus: Encoder
         return silent_encoder(what, subject_of(silent), THE_BUS)
     if set(named) & set(silent):
         return silent_encoder(f"{error.problem}; the others answer", subject_of(silent))
-    check = THE_BUS if len(named) == len(nodes) else "its supply for a dip, by which settings are lost"
+    check = THE_BUS if len(named) == len(nodes) else "its supply for a dip, and timeout_s"
     return silent_encoder(f"{error.problem}, but SDO requests are answered", subject_of(named), check)
 
 

@@ -233,7 +233,6 @@ class DbcSession(BankSession):
         return tuple(round(latest[signal.leg].position / self._settings.step) for signal in self._signals)
 
     def _silence(self, silent: list[PositionSignal]) -> SilentNodeError:
-        """The error for encoders that send nothing, by what else is on the bus."""
         what = f"sends nothing for {self._settings.timeout_s:g} s{self._bus.reported}"
         if len(silent) < len(self._signals):
             check = "its supply and cable, and the message in the DBC file"

@@ -51,16 +51,13 @@ def detect_nodes(nodes: Sequence[EncoderNode], bus: EncoderBus, timeout_s: float
         hint = f"; node {found} is on the bus but belongs to no leg" if unexpected else ""
         odd = [node for node in missing if node.sdo.latest or node.leg.node in bus.network.scanner.nodes]
         is_alone = len(missing) == len(nodes) and not (unexpected or odd)
-        where = "the CAN adapter, supply, cable, termination and bit rate" if is_alone else "supply, cable"
+        where = "the CAN adapter, supply, cable, termination, bit rate" if is_alone else "supply, cable"
         action = f"Check {where} and node id"
         if len(odd) == len(missing):
             hint += "; it sends, but no answer of eight bytes to SDO requests"
-            action = "Switch it off and on; if it stays so, set it with its vendor's tool"
-        raise BusError(
-            f"no device responds{hint}{bus.reported}",
-            subject=subject_of([node.leg for node in missing]),
-            action=action,
-        )
+            action = "Open the encoders again, it may just have started; else set it with its vendor's tool"
+        told = f"no device responds{hint}{bus.reported}"
+        raise BusError(told, subject=subject_of([node.leg for node in missing]), action=action)
 
 
 def read_device_type(node: EncoderNode, unit: JointUnit = JointUnit.MM) -> DeviceType:
@@ -172,7 +169,7 @@ def check_serial_number(node: EncoderNode, identity: DeviceIdentity, settings: E
 WHAT_IT_IS = {"device type": od.DEVICE_TYPE, "vendor": od.VENDOR, "product": od.PRODUCT}
 ABOUT, DEFAULT = "deviceinfo", "defaultvalue"
 ABOUT_KEYS = {od.VENDOR: "vendornumber", od.PRODUCT: "productnumber"}
-OCTAL = re.compile(r"-?0[0-7]+")
+ONE_DIGIT = re.compile(r"-?0*[0-9]")
 HOW_IT_IS_SET = {
     "operating parameters": od.OPERATING_PARAMETERS,
     "preset": od.PRESET,
@@ -273,9 +270,7 @@ def _default(lines: _Lines, entry: ObjectEntry, path: Path) -> int | None:
 
 def _number(text: str) -> int | None:
     """A number in decimal or hexadecimal; None for another text, and for what may be octal or decimal."""
-    if OCTAL.fullmatch(text) and int(text, 8) != int(text):
-        return None
     try:
-        return int(text, 16 if "x" in text.lower() else 10)
+        return int(text, 0)
     except ValueError:
-        return None
+        return int(text) if ONE_DIGIT.fullmatch(text) else None

@@ -204,7 +204,7 @@ class SyncSampler:
             raise duplicated_node("sent more positions than there were SYNCs", leg)
         if self._foreign_sync:
             raise BusError(
-                "another master sends SYNC on it",
+                "another master sends SYNC on it, or its adapter echoes what is sent",
                 subject=self.bus.name,
                 action="Give the encoders a bus of their own, or switch the other master off",
             )

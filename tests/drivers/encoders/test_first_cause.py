@@ -12,15 +12,9 @@ from tests.drivers.encoders.conftest import short_timeout
 @pytest.mark.parametrize(
     ("nodes", "told"),
     [
-        (
-            (4,),
-            r"^encoder of leg 4 \(node 4\): no response .*the others answer\. Check its supply and cable,",
-        ),
+        ((4,), r"^encoder of leg 4 \(node 4\): no .*the others answer\. Check its supply and cable,"),
         ((2, 4), r"^encoders of leg 2 .* leg 4 .*the others answer"),
-        (
-            range(1, 7),
-            r"leg 1 .* leg 6 .*no encoder answers\. Check the CAN adapter, supply and termination",
-        ),
+        (range(1, 7), r"leg 1 .* leg 6 .*no encoder answers\. Check the CAN adapter, supply and"),
     ],
 )
 async def test_all_that_are_silent_are_told_and_whether_others_answer(raw, make_bank, nodes, told):
@@ -48,7 +42,7 @@ async def test_a_node_that_sends_but_does_not_answer_is_told_so(raw, make_bank, 
     raw.nodes[3].answer_sdo = lambda request: answer(request)[:5]
     if kind == "heartbeat":
         raw.nodes[3].answer_sdo = lambda request: raw.send(0x703, b"\x7f") or b""
-    with pytest.raises(BusError, match=r"leg 3 .*sends, but no answer of eight.*Switch it off"):
+    with pytest.raises(BusError, match=r"leg 3 .*sends, but no answer of eight.*Open the encoders again"):
         await make_bank(timeout_s=0.3).open()
 
 
@@ -60,7 +54,7 @@ async def test_encoders_that_could_not_be_opened_say_why(raw, make_bank):
             await call()
 
 
-@pytest.mark.parametrize(("change", "told"), [(-(2**24), "24 bits that.*preset"), (9**7, "loose")])
+@pytest.mark.parametrize(("change", "told"), [(-(2**24), "24 bits that.*preset"), (9**7, "See what")])
 async def test_a_count_that_begins_anew_is_no_weak_magnet(raw, make_bank, change, told):
     bank = make_bank(largest_speed=1.0)
     await bank.open()
@@ -70,12 +64,17 @@ async def test_a_count_that_begins_anew_is_no_weak_magnet(raw, make_bank, change
         await bank.read()
 
 
+DAMAGED = can.CanOperationError("Could not read: can't decode byte 0xff")
+DAMAGED.__cause__ = ValueError()
+
+
 @pytest.mark.parametrize(
     ("fault", "told"),
     [
         (can.Message(is_error_frame=True, arbitration_id=0x20), "nobody acknowledges.*bit rate"),
         (can.Message(is_error_frame=True, arbitration_id=0x40), "gave up .*bus off"),
         (ValueError("non-hexadecimal number found"), "no frame .*End other programs that read this port"),
+        (DAMAGED, "no frame .*can't decode.*End other programs that read this port"),
         (can.CanOperationError("Network is down"), "Switch the CAN interface on"),
     ],
 )

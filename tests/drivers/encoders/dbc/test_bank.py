@@ -55,9 +55,7 @@ async def test_one_that_is_silent_from_the_start_is_named(settings, wire):
         await while_sending(wire, bank.open, without=5)
 
 
-@pytest.mark.parametrize(
-    ("frame", "told"), [(None, "CAN adapter.*bit rate"), (0x700, "but others do.*DBC")]
-)
+@pytest.mark.parametrize(("frame", "told"), [(None, "CAN adapter"), (0x700, "but others do.*DBC")])
 async def test_a_bus_without_any_encoder_is_told_and_not_the_first_leg(settings, wire, frame, told):
     bank = DbcBank(settings(wire.settings))
     opening = asyncio.create_task(bank.open())

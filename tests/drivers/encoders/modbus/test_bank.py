@@ -198,21 +198,17 @@ async def test_a_register_that_is_not_there_is_told(simulated):
         await bank.open()
 
 
-@pytest.fixture
-def refusing(monkeypatch):
-    """Has the devices refuse every request, or some, with an exception."""
+def refuse(monkeypatch, code, times=1000):
+    """Have the devices refuse requests, all or some, with an exception; what they were asked."""
+    answer, asked = ModbusScales.answer, list[bytes]()
+
+    def refused(scales, command):
+        asked.append(command)
+        return answer(scales, command) if len(asked) > times else refusal(command[0], command[1], code)
+
     monkeypatch.setattr(modbus_port, "PAUSE_S", 0.0)
-    answer, asked = ModbusScales.answer, []
-
-    def begin(code: int, times: int = 1000) -> list[bytes]:
-        def refuse(scales: ModbusScales, command: bytes) -> bytes:
-            asked.append(command)
-            return answer(scales, command) if len(asked) > times else refusal(command[0], command[1], code)
-
-        monkeypatch.setattr(ModbusScales, "answer", refuse)
-        return asked
-
-    return begin
+    monkeypatch.setattr(ModbusScales, "answer", refused)
+    return asked
 
 
 async def test_a_line_on_which_nothing_answers_is_told_and_not_its_first_device(simulated):
@@ -223,19 +219,17 @@ async def test_a_line_on_which_nothing_answers_is_told_and_not_its_first_device(
         await cell.driver.open()
 
 
-async def test_a_busy_device_is_asked_again(simulated, refusing):
+async def test_a_busy_device_is_asked_again(simulated, monkeypatch):
     cell = simulated()
-    refusing(6, times=3)
+    refuse(monkeypatch, 6, times=3)
     await cell.driver.open()
     assert (await cell.driver.read()).positions == pytest.approx(ALL)
 
 
 @pytest.mark.parametrize(("code", "times"), [(4, 1), (6, 4), (11, 1), (77, 1)])
-async def test_no_exception_but_of_absence_means_that_registers_are_not_there(
-    simulated, refusing, code, times
-):
+async def test_other_exceptions_do_not_mean_absence(simulated, monkeypatch, code, times):
     cell = simulated(registers=(0, 10, 20, 30, 40, 50))
-    asked = refusing(code)
+    asked = refuse(monkeypatch, code)
     with pytest.raises(RefusedRequest, match=rf"answers exception {code} .*look it up"):
         await cell.driver.open()
     assert {command[2:6] for command in asked} == {bytes.fromhex("00 00 00 34")}

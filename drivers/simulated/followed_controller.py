@@ -25,7 +25,7 @@ from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
-from hexacell.storage.atomic_files import write_atomically
+from hexacell.storage.atomic_files import write_own
 
 LONGEST_STEP_MM = 5.0
 """Longest step of a joint variable between two solutions of the pose: the assembly mode is kept."""
@@ -139,7 +139,7 @@ class FollowingPhysics(RobotPhysics):
         with suppress(FileError):  # a folder that cannot be written is no reason to have no gauges
             places = {"station": station.tolist(), "triad": triad.tolist()}
             kept = {"config": fingerprint(*self._config), **places}
-            write_atomically(self._kept, json.dumps(kept).encode())
+            write_own(self._kept, json.dumps(kept).encode())
 
     def encoder_positions(self) -> Array:
         with self._lock:

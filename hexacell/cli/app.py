@@ -7,13 +7,14 @@ import shlex
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from pathlib import Path
 
 from hexacell import __version__
 from hexacell.cli.arguments import make_parser
+from hexacell.cli.arguments.commands import output_of
 from hexacell.cli.console import Console, lost_output
 from hexacell.cli.process import fault_line, log, require_platform, stop_signals_as_sigint
 from hexacell.errors import ExitCode, HexacellError, UsageError
+from hexacell.storage.output_files import LOG, OutputFile
 
 _log = logging.getLogger(__name__)
 
@@ -38,6 +39,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             _require_usable(typed)
             options = parser.parse_args(typed)
             require_platform(options.target)
+            for named in vars(options).values():
+                if isinstance(named, OutputFile):  # before anything is done
+                    named.require()
             code = _carried_out(options, typed, console)
             if code or (lost := lost_output()) is None:
                 return code
@@ -55,10 +59,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _carried_out(options: argparse.Namespace, typed: Sequence[str], console: Console) -> int:
     """The exit code of the command, whose beginning, end and failure are logged where that is asked for."""
     inherited = os.environ.get(LOG_FILE)
-    file = getattr(options, "log_file", None if inherited is None else Path(inherited))
+    file = getattr(options, "log_file", None if inherited is None else output_of(LOG)(inherited))
     verbosity = getattr(options, "verbose", 0)
     if options.target == "tui.main" and file is not None:
-        os.environ[LOG_FILE] = str(file.absolute())  # the screen's run is in a process of its own
+        os.environ[LOG_FILE] = str(file.path.absolute())  # the screen's run is in a process of its own
     elif options.target == "tui.main" and verbosity:
         raise UsageError("the screen takes the whole terminal", action="Name a file: --log-file FILE")
 

@@ -22,6 +22,7 @@ from types import FrameType
 
 from hexacell import __version__
 from hexacell.errors import FileError, UsageError
+from hexacell.storage.output_files import OutputFile
 
 STOP_SIGNALS = tuple(
     number for name in ("SIGTERM", "SIGHUP") if (number := getattr(signal, name, None)) is not None
@@ -111,7 +112,7 @@ FORMAT = "%(asctime)s.%(msecs)03dZ %(levelname)s %(name)s: %(message)s"
 
 
 @contextmanager
-def log(file: Path | None, verbosity: int) -> Iterator[None]:
+def log(file: OutputFile | None, verbosity: int) -> Iterator[None]:
     """Log within this context: to a file, or with ``verbosity`` alone to stderr; raises ``FileError``.
 
     The log stands beside the journal of a run and replaces no part of it. Every module logs to a logger of
@@ -119,10 +120,11 @@ def log(file: Path | None, verbosity: int) -> Iterator[None]:
     the lines, where both are given or ``verbosity`` is 2.
     """
     try:
-        handler = logging.StreamHandler() if file is None else logging.FileHandler(file, encoding="utf-8")
+        stream = None if file is None else os.fdopen(file.open_stream(appends=True), "a", encoding="utf-8")
     except OSError as error:
         problem = f"the log cannot be written: {error.strerror or error}"
-        raise FileError(problem, subject=file, action="Name another file") from error
+        raise FileError(problem, subject=file.path if file else None, action="Name another file") from error
+    handler = logging.StreamHandler(stream)
     formatter = logging.Formatter(FORMAT, "%Y-%m-%dT%H:%M:%S")
     formatter.converter = time.gmtime
     handler.setFormatter(formatter)
@@ -140,3 +142,5 @@ def log(file: Path | None, verbosity: int) -> Iterator[None]:
             logger.removeHandler(handler)
             logger.setLevel(logging.NOTSET)
         handler.close()
+        if stream is not None:
+            stream.close()

@@ -33,7 +33,7 @@ class JsonRecord(Frozen):
 
     def save(self, path: Path, like: Path | None = None) -> None:
         """Write the record atomically, for those who can read ``like``; raises ``FileError``."""
-        atomic_files.write_atomically(path, self.to_json(), like=like)
+        atomic_files.write_own(path, self.to_json(), like=like)
 
     @classmethod
     def load(cls, path: Path) -> Self:

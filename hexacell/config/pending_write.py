@@ -78,7 +78,7 @@ def note_write(paths: Sequence[Path], before: Contents, after: Contents) -> None
         for path, old, new in zip(paths, before, after, strict=True)
     )
     most_private = min(paths, key=_readers)
-    atomic_files.write_atomically(place, _Note(files=files).to_json(), like=most_private)
+    atomic_files.write_own(place, _Note(files=files).to_json(), like=most_private)
 
 
 def forget_write(paths: Sequence[Path]) -> None:

@@ -121,7 +121,7 @@ def _back_up(receipt: Receipt, before: Contents, after: Contents) -> None:
             )
     for name, contents in ((BEFORE, before), (AFTER, after)):
         for path, data, like in zip(receipt.kept(name), contents, receipt.paths, strict=True):
-            atomic_files.write_atomically(path, data, like=like)
+            atomic_files.write_own(path, data, like=like)
     receipt.save(folder / RECEIPT, like=receipt.path)
     receipt.backup()
 
@@ -149,7 +149,7 @@ def _undo(
         """Keep a version that no commit wrote beside the backup, if possible, so that it is not lost."""
         with suppress(FileError):
             name = f"config-found-{atomic_files.sha256(found)[:12]}"
-            atomic_files.write_atomically(receipt.backup_folder / name, found, like=receipt.path)
+            atomic_files.write_own(receipt.backup_folder / name, found, like=receipt.path)
 
     try:
         replacement.restore(all_of_them=all_of_them, keep=keep)

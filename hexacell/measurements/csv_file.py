@@ -18,7 +18,7 @@ from hexacell.cell.fields import LARGEST_NUMBER
 from hexacell.errors import FileError
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import Directions, MeasurementSet, Record, RecordId, Temperatures
-from hexacell.storage.atomic_files import read_text, write_atomically
+from hexacell.storage.atomic_files import read_text, write_own
 from hexacell.storage.toml_document import shortened
 
 COUNTS = ("point", "orientation")
@@ -89,7 +89,7 @@ def write_measurements(path: Path, measurements: MeasurementSet) -> None:
         cells = (repr(float(number)) for number in numbers)
         temperatures = ("" if celsius is None else repr(float(celsius)) for celsius in shown)
         rows.writerow([one.point, one.orientation, *cells, *directions, *temperatures])
-    write_atomically(path, text.getvalue().encode())
+    write_own(path, text.getvalue().encode())
 
 
 def _records(path: Path, text: str, wanted: tuple[str, ...]) -> dict[RecordId, tuple[int, Record]]:

@@ -128,7 +128,7 @@ def ensure_certificate(folder: Path, uri: str, host: str) -> tuple[Path, Path]:
             key.unlink(missing_ok=True)
             with os.fdopen(os.open(key, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as stream:
                 stream.write(made_key)
-        atomic_files.write_atomically(certificate, made_certificate)
+        atomic_files.write_own(certificate, made_certificate)
     return certificate, key
 
 

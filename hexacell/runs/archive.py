@@ -160,10 +160,13 @@ class Archive:
             raise self._unavailable(error) from error
 
     def _act(self, act: Callable[[Connection], Found]) -> Found:
-        if self._file is not None and not self._is_ready and not self._file.exists():
+        if self._file is not None and not self._is_ready:
+            if self._file.is_symlink():  # SQLite would follow it, and make or change another file
+                raise ArchiveUnavailable("is a link", subject=self._file, action="Remove it")
             # SQLite would make a file as the umask has it; where it cannot, it says why.
             with suppress(OSError):
-                os.close(os.open(self._file, os.O_CREAT | os.O_WRONLY, 0o666 & ~NOT_FOR_OTHERS))
+                flags = os.O_CREAT | os.O_EXCL | os.O_WRONLY
+                os.close(os.open(self._file, flags, 0o666 & ~NOT_FOR_OTHERS))
         with self._engine.begin() as connection:
             if not self._is_ready:
                 if not inspect(connection).has_table(ARCHIVE_TABLE.name):

@@ -16,9 +16,10 @@ from pydantic import TypeAdapter, ValidationError
 from hexacell.cell.fields import Frozen, Name, first_mistake
 from hexacell.cell.loader import Cell
 from hexacell.errors import FileError, UsageError
-from hexacell.storage.atomic_files import create_folder_durably, os_errors, read_text, write_atomically
+from hexacell.storage.atomic_files import create_folder_durably, os_errors, read_text, write_own
+from hexacell.storage.output_files import RUN_JOURNAL
 
-JOURNAL = "journal.jsonl"
+JOURNAL = RUN_JOURNAL
 CELL_FILE = "cell.toml"
 MEASUREMENTS = "measurements.csv"
 RESULT = "result.json"
@@ -93,11 +94,11 @@ class RunFolder:
                 "this folder holds a run already", subject=self.path, action="Resume it, or name another"
             )
         create_folder_durably(self.path)
-        write_atomically(self.cell_file, cell.text_without_secrets.encode())
+        write_own(self.cell_file, cell.text_without_secrets.encode())
 
     def write_result(self, document: dict[str, Any]) -> None:
         """Keep an identification; raises ``FileError``."""
-        write_atomically(self.result, json.dumps(document, indent=1).encode() + b"\n")
+        write_own(self.result, json.dumps(document, indent=1).encode() + b"\n")
 
 
 def runs_folder(cell: Cell) -> Path:
@@ -215,7 +216,7 @@ def note_attempt(folder: RunFolder, mode: str, attempt: StartAttempt) -> StartAt
     before = read_attempts(folder)
     attempts = StartAttempts(mode=mode, attempts=(*(before.attempts if before else ()), attempt))
     create_folder_durably(folder.path)
-    write_atomically(folder.attempts, f"{attempts.model_dump_json(indent=1)}\n".encode())
+    write_own(folder.attempts, f"{attempts.model_dump_json(indent=1)}\n".encode())
     return attempts
 
 

@@ -129,6 +129,24 @@ def write_atomically(
         sync_folder(target.parent)
 
 
+def write_own(path: Path, data: bytes, *, like: Path | None = None) -> None:
+    """Replace or create a file of the program's own, as :func:`write_atomically`, but through no link.
+
+    Its folder may come from elsewhere, with a link in the place of the file.
+
+    Raises:
+        FileError: there is a link, or it cannot be written.
+    """
+    require_no_link(path)
+    write_atomically(path, data, like=like)
+
+
+def require_no_link(path: Path) -> None:
+    """Raise ``FileError`` if a file of the program's own is a link."""
+    if path.is_symlink():
+        raise FileError("is a link; a file of the program's own is none", subject=path, action="Remove it")
+
+
 def require_replaceable(path: Path) -> None:
     """Raise ``FileError`` if :func:`write_atomically` is known to refuse the file."""
     with os_errors("cannot be written and is unchanged", path):

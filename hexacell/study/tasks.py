@@ -118,6 +118,7 @@ def run_study(
     """
     tasks = {repr(task): task for task in study.tasks_of(draws)}
     path = folder / f"{study.name}.jsonl"
+    atomic_files.require_no_link(path)
     kept = TypeAdapter(cast("type[_Kept[ResultType]]", _Kept.__class_getitem__(study.result_type)))
     atomic_files.create_folder_durably(folder)
     results = {tasks[key]: result for key, result in _known(path, kept).items() if key in tasks}
@@ -149,6 +150,8 @@ def _known(path: Path, kept: TypeAdapter[_Kept[ResultType]]) -> dict[str, Result
                 action="Name another folder",
             ) from error
         found[result.key] = result.outcome
+    if rest and not (found or rest.startswith('{"key":')):
+        raise FileError("this is no study", subject=path, action="Name another folder")
     if rest:
         path.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
     return found

@@ -11,7 +11,7 @@ SHORT = ("budget_records = 40", "budget_records = 4")
 
 def test_each_event_is_a_line_as_in_the_journal(typed_here, quick_cell, few_candidates, tmp_path) -> None:
     target = tmp_path / "events.jsonl"
-    target.write_text("of yesterday\n")
+    target.write_text('{"n":1,"version":1,"at":"of yesterday"}\n')
     quick_cell.edit(SHORT)
     typed_here("run", quick_cell.cell, *CHECK, "--events", target)
     written = b"".join((run / "journal.jsonl").read_bytes() for run in quick_cell.runs())

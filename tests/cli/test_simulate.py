@@ -76,4 +76,4 @@ def test_the_files_of_the_cell_itself_are_not_written_over(cell_folder, typed_he
     before = cell_folder.cell.read_bytes()
     outcome = typed_here("simulate", cell_folder.cell, "--output", cell_folder.cell)
     assert (outcome.code, cell_folder.cell.read_bytes()) == (2, before)
-    assert "is a file of the simulated cell. Name another file" in " ".join(outcome.err.split())
+    assert "is left as it is. Name a new file" in " ".join(outcome.err.split())

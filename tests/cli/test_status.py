@@ -44,7 +44,7 @@ def test_a_calibrated_cell_and_one_without_runs(typed_here, demo, calibrated, ce
 
 def test_metrics_are_those_of_the_latest_verdict(typed_here, demo, calibrated, tmp_path) -> None:
     target = tmp_path / "hexacell.prom"
-    target.write_text("of yesterday")
+    target.write_text("# HELP hexacell_in_use of yesterday\n")
     text = calibrated.read_text().replace("[acceptance]\n", "[acceptance]\nvalid_days = 30\n", 1)
     calibrated.write_text(text.replace('name = "simulated-hexaglide"', 'name = "Zelle (3) #+"', 1))
     (calibrated.parent / "runs/simulated-hexaglide").rename(calibrated.parent / "runs/Zelle (3) #+")

@@ -120,7 +120,7 @@ def test_a_gauge_that_is_found_is_taken(path: Path, protocol: str) -> None:
 def test_a_file_that_came_meanwhile_is_not_written_over(path: Path) -> None:
     draft = CellDraft(path)
     path.write_text("of somebody else")
-    with pytest.raises(FileError, match="is there by now"):
+    with pytest.raises(FileError, match="is there already"):
         draft.write()
     assert path.read_text() == "of somebody else"
 

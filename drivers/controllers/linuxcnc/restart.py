@@ -28,6 +28,7 @@ from pathlib import Path
 from typing import Self
 
 from hexacell.errors import HexacellError, UsageError
+from hexacell.storage.atomic_files import require_no_link
 
 LOCK = Path("/tmp/linuxcnc.lock")  # noqa: S108 - LinuxCNC's own, there from its start to its end
 LOG = "linuxcnc.log"
@@ -150,6 +151,7 @@ def restart(ini: Path, ended_s: float = ENDED_S, poll_s: float = POLL_S) -> subp
     configured = _Configured.by(ini)
     _wait(configured.is_shut_down, ended_s, poll_s, "LinuxCNC does not end")
     log = ini.with_name(LOG)
+    require_no_link(log)
     with log.open("wb") as output:
         started = subprocess.Popen(  # noqa: S603 - LinuxCNC's own program
             ["linuxcnc", "-r", ini.name],  # noqa: S607 - wherever it is installed

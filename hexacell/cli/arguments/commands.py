@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from hexacell.errors import UsageError
+from hexacell.storage.output_files import LOG, OutputFile, OutputKind
 
 LARGEST_NODE_ID = 127
 LONGEST_S = 86_400.0
@@ -65,9 +66,14 @@ def add_value(
     container.add_argument(option, type=kind, default=default, metavar=metavar, help=f"{what}{shown}")
 
 
-def add_file(parser: Parser, option: str, what: str) -> None:
-    """Add an option that names a file."""
-    add_value(parser, option, "FILE", what, Path)
+def add_output(parser: Parser, option: str, kind: OutputKind, what: str) -> None:
+    """Add an option that names a file to be written, which only :class:`.OutputFile` opens."""
+    add_value(parser, option, "FILE", what, output_of(kind))
+
+
+def output_of(kind: OutputKind) -> Callable[[str], OutputFile]:
+    """The type of an argument: a file to be written."""
+    return lambda name: OutputFile(Path(name), kind)
 
 
 def add_parser(commands: Any, name: str, summary: str) -> Parser:  # noqa: ANN401 - argparse's own type is private
@@ -77,7 +83,8 @@ def add_parser(commands: Any, name: str, summary: str) -> Parser:  # noqa: ANN40
     )
     # Suppressed defaults: the options of an action must not hide those given before its name.
     words = "append to this file what the program does; with -v also the bytes on the lines"
-    parser.add_argument("--log-file", type=Path, default=argparse.SUPPRESS, metavar="FILE", help=words)
+    kind = output_of(LOG)
+    parser.add_argument("--log-file", type=kind, default=argparse.SUPPRESS, metavar="FILE", help=words)
     words = "log on stderr what the program does; twice: also the bytes on the lines"
     parser.add_argument("-v", "--verbose", action="count", default=argparse.SUPPRESS, help=words)
     return parser

@@ -8,13 +8,14 @@ from hexacell.cli.arguments.commands import (
     MODES,
     Parser,
     add_command,
-    add_file,
     add_flag,
+    add_output,
     add_parser,
     add_value,
     bounded_seconds,
     whole_number,
 )
+from hexacell.storage.output_files import METRICS, NEW_CELL, REPORT
 
 SHELLS = ("bash", "zsh", "fish")
 
@@ -30,7 +31,7 @@ def _devices(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is pr
     )
     words = "give the only device on a CAN bus this node id (LSS), after a question"
     add_value(parser, "--set-node", "ID", words, whole_number(1, LARGEST_NODE_ID))
-    add_file(parser, "--write", "write a cell file: what was found, and your answers to the rest")
+    add_output(parser, "--write", NEW_CELL, "write a cell file: what was found, and your answers")
     add_value(parser, "--diagnose", "NAME", "watch a gauge, or encoders, of --cell")
     add_value(parser, "--cell", "CELL", "the cell file (TOML) of --diagnose", Path)
     add_value(parser, "--seconds", "S", "how long --diagnose watches", bounded_seconds, 10.0)
@@ -52,7 +53,7 @@ def _schedule(commands: Any) -> None:  # noqa: ANN401
         help="check: change nothing (default); quick: correct what has drifted, optimise: recalibrate, "
         "and apply only within the limits",
     )
-    add_file(parser, "--metrics", "write metrics of the cell there after each run")
+    add_output(parser, "--metrics", METRICS, "write metrics of the cell there after each run")
     add_value(parser, "--folder", "FOLDER", "where the units are, if elsewhere", Path)
     parser.add_json()
 
@@ -61,7 +62,7 @@ def _status(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(commands, "status", "all cells at a glance: verdicts, and what waits for a person")
     parser.add_argument("cells", type=Path, nargs="*", metavar="CELL", help="cell files (TOML)")
     parser.add_archive("instead of cell files: all cells that share this archive")
-    add_file(parser, "--metrics", "write it as metrics for Prometheus' node exporter too")
+    add_output(parser, "--metrics", METRICS, "write it as metrics for Prometheus' node exporter too")
     parser.add_json()
 
 
@@ -151,9 +152,10 @@ def _report(commands: Any) -> None:  # noqa: ANN401
     summary = "write the report of a run: one file to read, print and file"
     parser = add_command(commands, "report", summary, "recorded.report")
     parser.add_run()
-    add_file(
+    add_output(
         parser,
         "--output",
+        REPORT,
         "where to (default: report.html in the run folder); .pdf gives PDF/A, .xml a Digital Calibration "
         "Certificate",
     )

@@ -7,12 +7,13 @@ from hexacell.cli.arguments.commands import (
     MODES,
     Parser,
     add_command,
-    add_file,
     add_flag,
+    add_output,
     add_parser,
     add_value,
     whole_number,
 )
+from hexacell.storage.output_files import EVENTS, SERVED_CELL
 
 
 def _demo(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
@@ -44,7 +45,7 @@ def _run(commands: Any) -> None:  # noqa: ANN401
         "check the length scale before the verdict, with the fixture of [length_check]; a resumed run "
         "has it if it was begun with it",
     )
-    add_file(parser, "--events", "write each event there, as a line of JSON, as it happens")
+    add_output(parser, "--events", EVENTS, "write each event there, as a line of JSON, as it happens")
     parser.add_json()
 
 
@@ -76,7 +77,7 @@ def _simulate(commands: Any) -> None:  # noqa: ANN401
     summary = "serve a simulated cell to other processes until interrupted"
     parser = add_command(commands, "simulate", summary, "serve.simulate")
     parser.add_cell()
-    add_file(parser, "--output", "write the cell file for `run` there instead of to stdout")
+    add_output(parser, "--output", SERVED_CELL, "write the cell file for `run` there instead of to stdout")
 
 
 def _host(commands: Any) -> None:  # noqa: ANN401

@@ -11,7 +11,7 @@ from drivers.discovery.encoders import set_node_id
 from hexacell.cli.commands.cell import cell_at
 from hexacell.cli.console import Console
 from hexacell.cli.terminal import is_interactive
-from hexacell.errors import AnswerNeeded, ExitCode, FileError, UsageError
+from hexacell.errors import AnswerNeeded, ExitCode, UsageError
 from hexacell.services.devices.device_diagnosis import diagnose
 from hexacell.services.devices.device_search import SearchFindings, draft_of, search_devices
 from hexacell.storage.atomic_files import require_creatable
@@ -51,7 +51,7 @@ def _set_node(options: argparse.Namespace, console: Console) -> ExitCode:
 
 def _search(options: argparse.Namespace, console: Console) -> ExitCode:
     if options.write is not None:
-        _require_new(options.write)
+        _require_creatable(options.write.path)
     buses = [_bus(words) for words in options.can]
     address = _address(options.controller)
     found = asyncio.run(search_devices(options.ports, buses, address))
@@ -60,15 +60,13 @@ def _search(options: argparse.Namespace, console: Console) -> ExitCode:
     for line in found_devices.search_lines(found):
         console.print(wrapped(line))
     if options.write is not None:
-        return _write(found, options.write, console)
+        return _write(found, options.write.path, console)
     if text:
         console.print(f"\nFor your cell file:\n\n{text}")
     return ExitCode.DONE
 
 
-def _require_new(path: Path) -> None:
-    if path.exists():
-        raise FileError("is there already", subject=path, action="Name a new file, or remove it")
+def _require_creatable(path: Path) -> None:
     require_creatable(path)
     if not is_interactive():
         raise AnswerNeeded("--write asks what no device reports", action="Start it at a terminal")

@@ -10,7 +10,7 @@ from hexacell.errors import ExitCode, UsageError
 from hexacell.services.history.reported_run import ReportedRun, reported_run
 from hexacell.services.history.run_export import export_run
 from hexacell.services.run.replay_run import replay
-from hexacell.storage.atomic_files import write_atomically
+from hexacell.storage.output_files import REPORT, OutputFile
 from hexacell.text import certificate
 from hexacell.text.layout import wrapped
 from hexacell.text.report.pages import Report, html_of, pdf_of
@@ -61,12 +61,14 @@ def replay_run(options: argparse.Namespace, console: Console) -> ExitCode:
 
 def report(options: argparse.Namespace, console: Console) -> ExitCode:
     """Write the report; the run folder is only read, unless the report goes into it."""
-    target = options.output or options.run / "report.html"
+    output = options.output or OutputFile(options.run / "report.html", REPORT)
+    target = output.path
     _require_possible(target, is_comparison=options.compare is not None)
+    output.require()
     earlier = None if options.compare is None else reported_run(options.compare)
     run = reported_run(options.run)
     made = report_of(run, earlier)
-    write_atomically(target, _written(target.suffix, run, made))
+    output.write(_written(target.suffix, run, made))
     console.document({"report": str(target), "identifier": made.identifier, "verdict": made.verdict})
     title = certificate.TITLE if target.suffix == CERTIFICATE else made.title.lower()
     console.print(f"{target}: {title}, {made.verdict}")

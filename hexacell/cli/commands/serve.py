@@ -14,7 +14,7 @@ from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
 from hexacell.services.preflight import is_loopback
 from hexacell.services.run.demo import require_simulation, served_cell
-from hexacell.storage.atomic_files import write_atomically
+from hexacell.storage.output_files import SERVED_MARK
 
 
 def results(options: argparse.Namespace, console: Console) -> ExitCode:
@@ -41,11 +41,6 @@ async def _serve_results(cell: Cell, settings: OpcUaSettings, console: Console) 
 def simulate(options: argparse.Namespace, console: Console) -> ExitCode:
     """Serve until interrupted; stdout gets a cell file with the addresses of the served devices."""
     cell = require_simulation(cell_at(options.cell, console))
-    if options.output is not None:
-        own = {path.resolve() for path in (cell.path, *cell.config_paths)}
-        if options.output.resolve() in own:
-            problem = f"--output {options.output} is a file of the simulated cell"
-            raise UsageError(problem, action="Name another file")
     return _until_stopped(_serve_cell(cell, options))
 
 
@@ -54,7 +49,7 @@ async def _serve_cell(cell: Cell, options: argparse.Namespace) -> None:
         if options.output is None:
             print(text, flush=True)
         else:
-            write_atomically(options.output, text.encode())
+            options.output.write(SERVED_MARK + text.encode())
         _announce("serving")
         await asyncio.Event().wait()
 

@@ -22,7 +22,6 @@ from hexacell.services.history.cell_status import (
     publish_status,
     summary_of,
 )
-from hexacell.storage.atomic_files import write_atomically
 from hexacell.text.history import legs_text
 from hexacell.text.layout import error_with_u, figure_with_u, minute, verdict_word
 from hexacell.verdict.decision import Verdict
@@ -63,7 +62,7 @@ def main(options: argparse.Namespace, console: Console) -> ExitCode:
         except FileError as error:
             console.warn(" ".join(str(error).split()))
     if options.metrics is not None:
-        write_atomically(options.metrics, metrics_text(found).encode(), for_everybody=True)
+        options.metrics.write(metrics_text(found).encode(), for_everybody=True)
     broken = [{"cell": path, "error": str(error)} for path, error in unreadable.items()]
     document = {"cells": [status_document(one) for one in found], "unreadable": broken}
     console.show(document, status_text(found, unreadable))

@@ -14,7 +14,7 @@ from pydantic_core import to_jsonable_python
 from hexacell.cli.console import Console
 from hexacell.cli.progress import task_bar
 from hexacell.errors import ExitCode, UsageError
-from hexacell.storage import atomic_files
+from hexacell.storage.output_files import PICTURE, PICTURE_MARK, OutputFile
 from hexacell.study import paper_experiment as experiment
 from hexacell.study import paper_simulation as simulation
 from hexacell.study.design_records import PAPER_DEG, RANDOM_DEG, OrientationChoice
@@ -165,13 +165,14 @@ STUDIES: Mapping[str, ShownStudy] = {row.study.name: row for row in _ROWS}
 def main(options: argparse.Namespace, console: Console) -> ExitCode:
     """One of the studies; its picture goes into the folder of its results."""
     shown, new_executor = STUDIES[options.study], _executors(options)
+    picture = OutputFile(options.folder / f"{shown.study.name}.svg", PICTURE)
+    picture.require()
     with task_bar(shown.study.unit) as progress:
         found = run_study(shown.study, options.folder, options.draws, new_executor, progress)
     for line in shown.lines(found):
         console.print(line)
-    picture = options.folder / f"{shown.study.name}.svg"
-    atomic_files.write_atomically(picture, shown.picture(found).encode())
-    console.print(f"\nThe same as a picture: {picture}")
+    picture.write(shown.picture(found).encode() + PICTURE_MARK)
+    console.print(f"\nThe same as a picture: {picture.path}")
     console.document(shown.document(found))
     return ExitCode.DONE
 

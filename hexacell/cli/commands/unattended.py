@@ -125,7 +125,7 @@ def schedule(options: argparse.Namespace, console: Console) -> ExitCode:
     elif options.daily is None:
         raise UsageError("the time of day is missing", action="Give --daily 02:30, --show or --remove")
     else:
-        run = scheduled_run(cell, options.daily, options.mode, options.metrics)
+        run = scheduled_run(cell, options.daily, options.mode, options.metrics and options.metrics.path)
         if (day := skipped_day(run.hour, run.minute, local_now().date())) is not None:
             console.warn(
                 f"{options.daily} is not there on {day}, as clocks go forward; that night nothing begins. "

@@ -20,7 +20,7 @@ from hexacell.errors import FileError, HexacellError, flatten_errors
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.plugins import Group, load, names
 from hexacell.services.offline import require_stated_poses
-from hexacell.storage.atomic_files import write_atomically
+from hexacell.storage.output_files import NEW_CELL, OutputFile
 from hexacell.storage.toml_document import KeyPath, TomlDocument
 
 HEADER = "# Made from a few answers. `hexacell cell show` prints it with every default.\n\n"
@@ -193,9 +193,7 @@ class CellDraft:
 
         The file is there already, it cannot be written, or a pose is out of reach.
         """
-        if self.path.exists():
-            raise FileError("is there by now", subject=self.path, action="Remove it, or name another")
-        write_atomically(self.path, self._text(self.given).encode())
+        OutputFile(self.path, NEW_CELL).write(self._text(self.given).encode())
         try:
             cell = load_cell(self.path)
             require_stated_poses(cell)

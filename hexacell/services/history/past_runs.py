@@ -107,6 +107,7 @@ class KeptFor(StrEnum):
     PROPOSAL = "its proposal can still be applied"
     RESUMABLE = "it is not over"
     UNREADABLE = "it cannot be read"
+    LINKED = "its folder is a link, and it is elsewhere"
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +140,8 @@ def reason_to_keep(run: PastRun) -> KeptFor | None:
     from hexacell.services.history.run_summary import is_applied_later  # noqa: PLC0415 - reads journals
 
     was = run.summary
+    if run.folder.path.is_symlink():
+        return KeptFor.LINKED
     if not was.mode:
         return KeptFor.UNREADABLE
     if run.is_in_controller or was.has_written or is_applied_later(run.folder):
@@ -173,4 +176,7 @@ def _delete(path: Path) -> None:
 
 def _remove(path: Path) -> None:
     with os_errors("cannot be deleted", path):
-        shutil.rmtree(path)
+        if path.is_symlink():
+            path.unlink()  # of a run that is elsewhere, and stays
+        else:
+            shutil.rmtree(path)

@@ -33,7 +33,7 @@ def export_run(run: Path, target: Path) -> tuple[str, ...]:
     names = []
     for name, data in _files(folder):
         atomic_files.create_folder_durably((target / name).parent)
-        atomic_files.write_atomically(target / name, data)
+        atomic_files.write_own(target / name, data)
         names.append(name)
     return tuple(names)
 

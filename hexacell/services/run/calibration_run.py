@@ -23,7 +23,7 @@ from hexacell.services.history.recorded_cell import started_robot, with_changes
 from hexacell.services.history.resumption import require_own_run
 from hexacell.services.run.accepted_results import last_accepted_result
 from hexacell.services.write_back.config_rollback import require_no_provisional
-from hexacell.storage.atomic_files import read_text, remove_stale_temporaries, write_atomically
+from hexacell.storage.atomic_files import read_text, remove_stale_temporaries, write_own
 from procedures.calibration.calibration import Calibration, Mode
 from procedures.devices.device_set import Devices, LiveValues
 from procedures.devices.reconnection import require_known
@@ -185,7 +185,7 @@ async def _run(
     finally:
         # The trace only helps to find faults: whether it can be kept does not decide how a run ends.
         with suppress(FileError):
-            write_atomically(folder.new_wire(), connected.trace.text().encode())
+            write_own(folder.new_wire(), connected.trace.text().encode())
 
 
 def run_started(

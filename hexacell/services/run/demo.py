@@ -14,7 +14,7 @@ from hexacell.runs.cell_lock import cell_lock, lock_path
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.devices.device_setup import device_addresses
 from hexacell.services.run.calibration_run import RunRequest
-from hexacell.storage.atomic_files import create_folder_durably, os_errors, write_atomically
+from hexacell.storage.atomic_files import create_folder_durably, os_errors, write_own
 from procedures.calibration.calibration import Mode
 from procedures.engine.commands import UnattendedOperator
 
@@ -78,7 +78,7 @@ def prepare_demo(folder: Path, config_name: str) -> RunRequest:
 def _copy_cell(cell_file: Path, folder: Path) -> Path:
     """Replace what an earlier demo left in ``folder`` by a copy of the cell."""
     if folder.is_dir() and any(folder.iterdir()):
-        if not (folder / MARKER).is_file():
+        if not (folder / MARKER).is_file() or (folder / MARKER).is_symlink():
             raise FileError(
                 "this folder is not empty, and no earlier demo's",
                 subject=folder,
@@ -86,9 +86,9 @@ def _copy_cell(cell_file: Path, folder: Path) -> Path:
             )
         _clear(folder)
     create_folder_durably(folder)
-    write_atomically(folder / MARKER, b"made by hexacell demo, which replaces this folder\n")
+    write_own(folder / MARKER, b"made by hexacell demo, which replaces this folder\n")
     for source in cell_file.parent.glob(f"{cell_file.stem}*.toml"):
-        write_atomically(folder / source.name, source.read_bytes())
+        write_own(folder / source.name, source.read_bytes())
     return folder / cell_file.name
 
 

@@ -5,13 +5,13 @@ The run never waits for who reads them. A target that cannot take a line is give
 
 import errno
 import os
-import stat
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
 from hexacell.errors import UsageError
 from hexacell.storage.atomic_files import os_error_to_file_error
+from hexacell.storage.output_files import OutputFile
 from procedures.engine.engine import Listener
 from procedures.run.state import RunState
 from procedures.steps import events
@@ -20,14 +20,14 @@ CHUNK = 1 << 16
 
 
 class EventStream:
-    """Copies journals, each from its beginning, to a pipe or a file, which is replaced.
+    """Copies journals, each from its beginning, to a pipe or a file, where an earlier stream is replaced.
 
     ``warn`` is called once if the target takes no more. Raises ``UsageError`` for a pipe that nobody reads,
     ``FileError`` for a target that cannot be written.
     """
 
-    def __init__(self, target: Path, warn: Callable[[str], None]) -> None:
-        self._target = target
+    def __init__(self, target: OutputFile, warn: Callable[[str], None]) -> None:
+        self._target = target.path
         self._warn = warn
         self._descriptor: int | None = _opened(target)
 
@@ -65,16 +65,12 @@ class EventStream:
         return copied
 
 
-def _opened(target: Path) -> int:
-    flags = os.O_WRONLY | os.O_CREAT | os.O_NONBLOCK | os.O_CLOEXEC
+def _opened(target: OutputFile) -> int:
     try:
-        descriptor = os.open(target, flags, 0o600)
-        if stat.S_ISREG(os.fstat(descriptor).st_mode):
-            os.ftruncate(descriptor, 0)
+        return target.open_stream(waits=False)
     except OSError as error:
         with suppress(OSError):
-            if target.is_fifo():
+            if target.path.is_fifo():
                 action = "Start its reader first"
-                raise UsageError("nobody reads this pipe", subject=target, action=action) from error
-        raise os_error_to_file_error("events cannot be written", target, error) from error
-    return descriptor
+                raise UsageError("nobody reads this pipe", subject=target.path, action=action) from error
+        raise os_error_to_file_error("events cannot be written", target.path, error) from error

@@ -45,7 +45,7 @@ class NoticeOutbox:
             FileError: it cannot be kept, as on a full disk.
         """
         atomic_files.create_folder_durably(self._folder)
-        atomic_files.write_atomically(self._file(pending), pending.model_dump_json().encode() + b"\n")
+        atomic_files.write_own(self._file(pending), pending.model_dump_json().encode() + b"\n")
 
     def forget(self, pending: PendingNotice) -> None:
         """Remove a notice that was delivered.

@@ -103,8 +103,8 @@ def write_schedule(run: ScheduledRun, folder: Path | None) -> Schedule:
             groups.append(grp.getgrnam(group).gr_name)
     atomic_files.create_folder_durably(place)
     _remove_units([path for path in _units_of(run.cell, place) if path not in {service, timer}])
-    atomic_files.write_atomically(service, service_text(run, user, groups).encode())
-    atomic_files.write_atomically(timer, timer_text(run).encode())
+    atomic_files.write_own(service, service_text(run, user, groups).encode())
+    atomic_files.write_own(timer, timer_text(run).encode())
     return Schedule(run.unit, (service, timer), is_of_system, _verified((service, timer)))
 
 

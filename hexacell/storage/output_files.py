@@ -1,0 +1,135 @@
+"""Files that a command writes because an option names them: one place opens all of them.
+
+What a person types may be the name of a cell, a config or a journal. An option therefore replaces only a
+file that an earlier call of it wrote, which the file's own text shows, or an empty one. Beside a journal
+nothing is written but a report, and that through no link: the folder may come from elsewhere.
+"""
+
+import os
+import re
+import stat
+from dataclasses import dataclass
+from pathlib import Path
+
+from hexacell.errors import FileError
+from hexacell.storage.atomic_files import NOT_FOR_OTHERS, os_errors, write_atomically
+
+RUN_JOURNAL = "journal.jsonl"
+"""Name of the file that makes a folder that of a run."""
+
+_OWN_NOTES = ".hexacell-"
+"""Is in the names of locks and notes, which may be empty."""
+
+_SEARCHED_BYTES = 1 << 16
+_ANOTHER = "Name a new file"
+
+
+@dataclass(frozen=True, slots=True)
+class OutputKind:
+    """What an option writes.
+
+    Attributes:
+        noun: what it is, for messages.
+        mark: what the first or the last bytes of each such file have and no other's; None where the file
+            must be new.
+        mode: the permissions of a new file that is written bit by bit.
+        may_be_in_run: whether it may be put into a run folder.
+    """
+
+    noun: str
+    mark: re.Pattern[bytes] | None
+    mode: int = 0o666 & ~NOT_FOR_OTHERS
+    may_be_in_run: bool = False
+
+
+EVENTS = OutputKind("events of a run", re.compile(rb'\A\{"n":1,"version":\d+,"at":"'), mode=0o600)
+LOG = OutputKind("a log of hexacell", re.compile(rb"\A\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z [A-Z]+ [a-z]"))
+METRICS = OutputKind("metrics of cells", re.compile(rb"\A# HELP hexacell_"))
+REPORT = OutputKind(
+    "a report of a run",
+    re.compile(
+        rb'<meta name="generator" content="hexacell">|\A%PDF-[\s\S]*hexacell'
+        rb"|\A<\?xml [\s\S]*<dcc:dccSoftware>[\s\S]{0,200}>hexacell<"
+    ),
+    may_be_in_run=True,
+)
+PICTURE_MARK = b"<!-- made by hexacell study, which replaces this file -->\n"
+PICTURE = OutputKind("a picture of a study", re.compile(re.escape(PICTURE_MARK) + rb"\Z"))
+SERVED_MARK = b"# made by hexacell simulate, which replaces this file\n"
+SERVED_CELL = OutputKind("a cell file of `simulate`", re.compile(rb"\A" + re.escape(SERVED_MARK)))
+NEW_CELL = OutputKind("a new cell file", None)
+
+
+@dataclass(frozen=True, slots=True)
+class OutputFile:
+    """A file that an option names, and what the option writes."""
+
+    path: Path
+    kind: OutputKind
+
+    def require(self) -> bytes | None:
+        """What the file holds that is to be replaced; None if there is none, or it is a pipe or a device.
+
+        Raises:
+            FileError: there is a file that this option did not write, a link to nothing, or it is the
+                folder of a run.
+        """
+        with os_errors("cannot be written", self.path):
+            target = Path(os.path.realpath(self.path))
+            is_link = self.path.is_symlink()
+            if not self.kind.may_be_in_run and os.path.lexists(target.parent / RUN_JOURNAL):
+                raise self._refusal("is in the folder of a run, which keeps only what the run wrote")
+            if is_link and os.path.lexists(self.path.parent / RUN_JOURNAL):
+                raise self._refusal("is a link in the folder of a run")
+            try:
+                status = target.stat()
+            except (FileNotFoundError, NotADirectoryError):
+                if is_link:
+                    raise self._refusal("is a link to nothing") from None
+                return None
+            if not stat.S_ISREG(status.st_mode):
+                return None
+            data = target.read_bytes()
+        self._require_ours(data[:_SEARCHED_BYTES] + data[-_SEARCHED_BYTES:])
+        return data
+
+    def write(self, data: bytes, *, for_everybody: bool = False) -> None:
+        """Write a whole file in one step; raises ``FileError`` as :meth:`require` and if it cannot be."""
+        found = self.require()
+        write_atomically(self.path, data, expected=found, for_everybody=for_everybody)
+
+    def open_stream(self, *, appends: bool = False, waits: bool = True) -> int:
+        """A descriptor for what is written bit by bit; the file is emptied first, unless one ``appends``.
+
+        With ``waits`` a pipe waits for its reader.
+
+        Raises:
+            OSError: it cannot be opened.
+            FileError: as :meth:`require`.
+        """
+        self.require()
+        flags = os.O_CLOEXEC | (os.O_APPEND if appends else 0) | (0 if waits else os.O_NONBLOCK)
+        try:
+            return os.open(self.path, flags | os.O_WRONLY | os.O_CREAT | os.O_EXCL, self.kind.mode)
+        except FileExistsError:
+            is_file = self.path.is_file()  # a pipe opened for reading, too, would never miss its reader
+        descriptor = os.open(self.path, flags | (os.O_RDWR if is_file else os.O_WRONLY))
+        try:
+            if stat.S_ISREG(os.fstat(descriptor).st_mode):
+                self._require_ours(os.pread(descriptor, _SEARCHED_BYTES, 0))
+                if not appends:
+                    os.ftruncate(descriptor, 0)
+        except BaseException:
+            os.close(descriptor)
+            raise
+        return descriptor
+
+    def _require_ours(self, data: bytes) -> None:
+        mark = self.kind.mark
+        if mark is None:
+            raise self._refusal("is there already")
+        if (data or _OWN_NOTES in self.path.name) and mark.search(data) is None:
+            raise self._refusal(f"holds something else than {self.kind.noun}, and is left as it is")
+
+    def _refusal(self, problem: str) -> FileError:
+        return FileError(problem, subject=self.path, action=_ANOTHER)

@@ -13,6 +13,7 @@ import threading
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
+from unittest.mock import AsyncMock
 
 import pytest
 from hypothesis import settings
@@ -67,6 +68,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def pytest_collection_finish() -> None:
     """What was collected stays until the end: looking for garbage in it again and again takes seconds."""
     gc.freeze()
+
+
+@pytest.fixture
+def records_agree(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For runs without records, which tests write: what they propose counts as what records give."""
+    monkeypatch.setattr("hexacell.services.write_back.proposals.require_as_recorded", AsyncMock())
 
 
 @pytest.fixture(scope="module")

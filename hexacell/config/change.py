@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import io
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar, Literal, Self
@@ -90,6 +91,13 @@ class ConfigChange(JsonRecord):
     def paths(self) -> tuple[Path, ...]:
         """All files of the config, the first one first."""
         return (self.path, *(one.path for one in self.further))
+
+    def to_files(self, paths: Sequence[Path]) -> Self:
+        """The same change of other files, such as those of a machine's folder that was copied."""
+        first, *others = (path.absolute() for path in paths)
+        further = zip(self.further, others, strict=True)
+        moved = tuple(one.model_copy(update={"path": path}) for one, path in further)
+        return self.model_copy(update={"path": first, "further": moved})
 
     @property
     def before_contents(self) -> Contents:
@@ -195,7 +203,7 @@ class Receipt(JsonRecord):
     """What a commit did, and where the backup is.
 
     ``further`` are the files of the config beside ``path``; ``backup_folder`` is where the receipt was
-    found; a run folder may be moved.
+    written, or found: a run folder may be moved.
     """
 
     noun: ClassVar[str] = "receipt of a write-back"
@@ -209,8 +217,18 @@ class Receipt(JsonRecord):
 
     @classmethod
     def of(cls, folder: Path) -> Receipt:
-        """The receipt kept in a run folder; raises ``FileError``."""
-        return cls.load(folder / RECEIPT).model_copy(update={"backup_folder": folder.absolute()})
+        """The receipt kept in a run folder; raises ``FileError``.
+
+        Where folder and config were copied or moved together, it is of the config that is beside it now.
+        """
+        found, here = cls.load(folder / RECEIPT), folder.absolute()
+        if found.backup_folder == here:
+            return found
+        way = [os.path.relpath(one, found.backup_folder) for one in found.paths]
+        with atomic_files.os_errors("cannot be read", folder):
+            moved = [Path(os.path.normpath(here / one)) for one in way]
+            first, *further = moved if all(one.is_file() for one in moved) else found.paths
+        return found.model_copy(update={"path": first, "further": tuple(further), "backup_folder": here})
 
     @classmethod
     def for_change(cls, change: ConfigChange, backup_folder: Path) -> Receipt:

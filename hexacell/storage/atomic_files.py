@@ -143,7 +143,9 @@ def write_own(path: Path, data: bytes, *, like: Path | None = None) -> None:
 
 def require_no_link(path: Path) -> None:
     """Raise ``FileError`` if a file of the program's own is a link."""
-    if path.is_symlink():
+    with os_errors("cannot be written and is unchanged", path):
+        is_link = path.is_symlink()
+    if is_link:
         raise FileError("is a link; a file of the program's own is none", subject=path, action="Remove it")
 
 

@@ -19,6 +19,7 @@ from pydantic import BaseModel
 from drivers.encoders.bank import joint_variables
 from hexacell import __version__
 from hexacell.cell.devices import EncoderSettings
+from hexacell.config.change import ConfigChange
 from hexacell.errors import ExitCode, HexacellError
 from procedures.devices.settling import trimmed_mean
 from procedures.engine.engine import Engine
@@ -77,7 +78,8 @@ class ReplayReport:
     """A run that is replayed, by which software it was recorded, and the findings so far.
 
     ``events`` is how many its journal has, ``decisions`` and ``results`` are how many of these were
-    computed again, ``taken`` is how many other events were taken from the journal.
+    computed again, ``taken`` is how many other events were taken from the journal. ``change`` is the change
+    of the config that was proposed again, if any.
     """
 
     journal: Path
@@ -88,6 +90,7 @@ class ReplayReport:
     results: int = 0
     taken: int = 0
     differences: list[Difference] = field(default_factory=list)
+    change: ConfigChange | None = None
 
     @property
     def is_same_software(self) -> bool:

@@ -32,10 +32,10 @@ from hexacell.config.change import RECEIPT, ConfigChange, Receipt, propose
 from hexacell.config.layout import ConfigLayout, Contents, fingerprint, fingerprint_of, read_contents
 from hexacell.config.write_back import commit, rollback
 from hexacell.config.write_record import THE_RUN, WriteCause, WriteKind, recorded_write
-from hexacell.errors import FileError, HexacellError, Interruption, WriteBackUndone
+from hexacell.errors import FileError, HexacellError, Interruption, UsageError, WriteBackUndone
 from hexacell.kinematics.corrections import Corrections
 from hexacell.kinematics.geometry import Geometry
-from hexacell.runs.run_folder import RunFolder
+from hexacell.runs.run_folder import RunFolder, run_folders
 from procedures.guards.guards import Guards
 from procedures.run.cancellation import in_thread
 from procedures.run.questions import YES, Operator, ask_startup
@@ -209,6 +209,21 @@ def holds_provisional(folder: RunFolder, config: tuple[Path, ...]) -> bool:
     """Whether a config holds the provisional geometry that a run wrote; raises ``FileError``."""
     backup = folder.path / PROVISIONAL_FOLDER
     return (backup / RECEIPT).is_file() and Receipt.of(backup).sha256_after == fingerprint(*config)
+
+
+def require_no_provisional(cell: Cell) -> None:
+    """Refuse a config that holds the provisional geometry of an interrupted run.
+
+    Raises:
+        UsageError: names that run.
+    """
+    for folder in run_folders(cell):
+        if holds_provisional(folder, cell.config_paths):
+            raise UsageError(
+                f"the run {folder.path} was interrupted and left its provisional geometry here",
+                subject=cell.config_path,
+                action="Resume that run, which restores the geometry",
+            )
 
 
 @dataclass(eq=False)

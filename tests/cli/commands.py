@@ -115,7 +115,7 @@ def started_in(folder: Path) -> Iterator[Start]:
     def start(*arguments: object, through: str | None = None, **streams: int) -> Process:
         out, err, temporary = (folder / f"{name}-{len(processes)}" for name in ("out", "err", "temporary"))
         with out.open("w") as to_out, err.open("w") as to_err, terminal_signals():
-            words = run_of_little_effort if arguments[0] == "run" else command
+            words = run_of_little_effort if arguments[0] in {"run", "apply"} else command
             popen = subprocess.Popen(
                 [*(["sh", "-c", through, "sh"] if through else []), *words(*arguments)],
                 cwd=folder,

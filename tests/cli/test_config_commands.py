@@ -1,8 +1,12 @@
 """``apply`` and ``rollback`` as they are typed."""
 
+import pytest
+
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from tests.cli.terminal import ended
 from tests.hexacell.services.proposed_runs import MET, propose_run
+
+pytestmark = pytest.mark.usefixtures("records_agree")
 
 GRAVE = AcceptanceGate(
     name="within tolerance", passed=False, sentence="Beyond: S1x.", needs_person=True, needs_cell_name=True

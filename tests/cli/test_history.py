@@ -2,11 +2,15 @@
 
 import json
 
+import pytest
+
 from hexacell.config.write_back import commit
 from hexacell.config.write_record import RECORDS
 from tests.hexacell.services.proposed_runs import propose_run
 from tests.hexacell.services.recorded_nights import Nights
 from tests.hexacell.services.test_history import identified
+
+pytestmark = pytest.mark.usefixtures("records_agree")
 
 KEYS = {
     "run", "began", "ended", "mode", "records", "verdict", "position_mm", "expanded_mm", "limit_mm", "line",

@@ -13,6 +13,8 @@ from tests.cli.commands import surroundings
 from tests.hexacell.services.proposed_runs import ProposedRun, propose_run
 from tests.several_config_files import hexapod_cell
 
+pytestmark = pytest.mark.usefixtures("records_agree")
+
 KILLED_AFTER = """
 import os, signal, sys
 from pathlib import Path
@@ -27,6 +29,10 @@ def replace(source, target):
 os.replace = replace
 sys.argv = ["hexacell", *sys.argv[2:]]
 from hexacell.__main__ import main
+if "apply" in sys.argv:  # of a run without records
+    from unittest.mock import AsyncMock
+    from hexacell.services.write_back import proposals
+    proposals.require_as_recorded = AsyncMock()
 sys.exit(main())
 """
 """The program, killed once it has replaced so many files of the config."""

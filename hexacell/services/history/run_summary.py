@@ -9,6 +9,7 @@ import numpy as np
 from hexacell.cell.model import CellSettings
 from hexacell.checks.change_alarm import has_silent_leg, machine_records
 from hexacell.config.change import RECEIPT, Receipt
+from hexacell.config.later_approval import later_approval
 from hexacell.errors import HexacellError, UsageError
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MEASURED_PARTS, MeasurementSet, RecordId
@@ -17,7 +18,6 @@ from hexacell.runs.run_folder import RunFolder, read_attempts
 from hexacell.services.history.journal_soundness import read_sound
 from hexacell.services.history.recorded_cell import started_robot
 from hexacell.services.history.run_index import EvidenceDocument, RunSummary
-from hexacell.services.write_back.proposals import later_approval
 from procedures.calibration.calibration import Calibration, Mode
 from procedures.journal.journal import Entry, read_entries, read_journal
 from procedures.run.keys import Phase

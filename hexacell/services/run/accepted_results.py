@@ -6,6 +6,7 @@ from pathlib import Path
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.loader import Cell
 from hexacell.config.change import Receipt
+from hexacell.config.later_approval import later_approval
 from hexacell.config.layout import fingerprint
 from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
@@ -13,7 +14,6 @@ from hexacell.results.result import AcceptedResult, IdentificationResult, Length
 from hexacell.runs.run_folder import RunFolder, run_folders
 from hexacell.services.history.journal_soundness import read_sound
 from hexacell.services.history.recorded_cell import started_robot
-from hexacell.services.write_back.proposals import later_approval
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.length_check import with_measured_scale
 from procedures.calibration.calibration import Calibration, Mode

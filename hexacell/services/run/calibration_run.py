@@ -22,7 +22,6 @@ from hexacell.services.history.journal_soundness import require_sound
 from hexacell.services.history.recorded_cell import started_robot, with_changes
 from hexacell.services.history.resumption import require_own_run
 from hexacell.services.run.accepted_results import last_accepted_result
-from hexacell.services.write_back.config_rollback import require_no_provisional
 from hexacell.storage.atomic_files import read_text, remove_stale_temporaries, write_own
 from procedures.calibration.calibration import Calibration, Mode
 from procedures.devices.device_set import Devices, LiveValues
@@ -31,6 +30,7 @@ from procedures.engine.commands import CommandQueue, QuestionBroker
 from procedures.engine.engine import Engine, Listener
 from procedures.guards.position_check import PositionCheck
 from procedures.journal.journal import Journal, read_journal
+from procedures.resources.controller_config import require_no_provisional
 from procedures.run.questions import Operator
 from procedures.run.state import fold
 from procedures.steps import events

@@ -43,6 +43,8 @@ async def replay(run: Path, scope: Scope = Scope.ALL, tolerance: float = TOLERAN
         executor, started = _set_up(Path(name), folder, started, entries)
         replayer = Replayer(executor, report, scope, tolerance)
         await replayer.replay([replace(entries[0], event=started), *entries[1:]])
+        if executor.folder.proposal.exists():
+            report.change = ConfigChange.load(executor.folder.proposal)
     return report
 
 

@@ -12,11 +12,11 @@ from pathlib import Path
 
 from hexacell.cell.loader import Cell
 from hexacell.config.change import Receipt
+from hexacell.config.later_approval import later_approval
 from hexacell.config.write_record import RECORDS, THE_RUN, WriteKind, WriteRecord, read_records
 from hexacell.errors import HexacellError
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.write_back.config_rollback import receipts_of
-from hexacell.services.write_back.proposals import later_approval
 from hexacell.verdict.decision import Verdict
 from procedures.journal.journal import Entry, read_entries
 from procedures.run.state import RunState, apply

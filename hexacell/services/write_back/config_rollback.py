@@ -15,7 +15,7 @@ from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.runs.run_folder import find_run, run_folders, runs_folder
 from hexacell.services.write_back.proposals import COMMAND
 from procedures.journal.journal import RESTORE
-from procedures.resources.controller_config import holds_provisional
+from procedures.resources.controller_config import require_no_provisional
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ def roll_back_config(
             restored, contents = _written_files(cell, to)
         else:
             restored, contents = _files_before(cell, undone, receipts)
-        _require_known(cell, receipts, found)
+        _require_known(cell, receipts, found, restored)
         if contents != found:
             run = restored[0].parent.name
             why = f"by hand, as it was before {run}" if to is None else f"by hand, as {run} wrote it"
@@ -94,7 +94,7 @@ def _files_before(
     if undone is not None:
         return undone.kept(BEFORE), undone.backup()
     if receipts:
-        _require_known(cell, receipts, read_contents(cell.config_paths))
+        _require_known(cell, receipts, read_contents(cell.config_paths), receipts[-1].kept(AFTER))
     raise UsageError(
         "no run of this cell wrote the config that is there now: nothing is to be undone",
         subject=cell.config_path,
@@ -113,7 +113,7 @@ def _written_files(cell: Cell, named: str) -> tuple[tuple[Path, ...], Contents]:
     if not are_same_files(receipt.paths, cell.config_paths):
         raise UsageError(
             f"the run {folder.path} is of another config, {' and '.join(map(str, receipt.paths))}",
-            action="Name a run of this cell",
+            action=_by_hand(receipt.kept(AFTER), "if it is one of this machine"),
         )
     written = receipt.kept(AFTER)
     if link := next((path for path in written if path.is_symlink()), None):
@@ -121,22 +121,14 @@ def _written_files(cell: Cell, named: str) -> tuple[tuple[Path, ...], Contents]:
     return written, receipt.written()
 
 
-def require_no_provisional(cell: Cell) -> None:
-    """Refuse a config that holds the provisional geometry of an interrupted run.
-
-    Raises:
-        UsageError: names that run.
-    """
-    for folder in run_folders(cell):
-        if holds_provisional(folder, cell.config_paths):
-            raise UsageError(
-                f"the run {folder.path} was interrupted and left its provisional geometry here",
-                subject=cell.config_path,
-                action="Resume that run, which restores the geometry",
-            )
+def _by_hand(copies: tuple[Path, ...], when: str) -> str:
+    """How a person restores a version that the program may not."""
+    return f"Copy {' and '.join(map(str, copies))} over the config by hand, {when}"
 
 
-def _require_known(cell: Cell, receipts: list[Receipt], found: Contents) -> None:
+def _require_known(
+    cell: Cell, receipts: list[Receipt], found: Contents, restored: tuple[Path, ...]
+) -> None:
     """What a rollback replaces must be kept in a run folder; else an edit would be lost."""
     path, sha256 = cell.config_path, fingerprint_of(found)
     if any(sha256 in {one.sha256_before, one.sha256_after} for one in receipts):
@@ -144,7 +136,9 @@ def _require_known(cell: Cell, receipts: list[Receipt], found: Contents) -> None
     require_no_provisional(cell)
     if not receipts:
         raise UsageError(
-            "no run of this cell wrote it: it would be lost", subject=path, action="Keep a copy elsewhere"
+            "no run of this cell wrote it: it would be lost",
+            subject=path,
+            action=_by_hand(restored, "once there is a copy of it elsewhere"),
         )
     raise _edited_since(cell, receipts[-1])
 

@@ -1,43 +1,47 @@
-"""The proposal of a run, written into the controller's config afterwards by a person."""
+"""The proposal of a run, written into the controller's config afterwards by a person.
 
+A run folder may come from elsewhere. So the config is that of the cell beside it, and what the folder
+says of gates, geometry and text is computed again from the records before anything is written.
+"""
+
+from contextlib import suppress
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
-from typing import ClassVar
 
-from hexacell.cell.loader import load_cell
-from hexacell.config.change import ConfigChange, JsonRecord
+from hexacell.cell.loader import Cell, load_cell
+from hexacell.config.change import ConfigChange
 from hexacell.config.interface import ControllerGeometry
+from hexacell.config.later_approval import LaterApproval, approval_path
 from hexacell.config.layout import ConfigLayout, are_same_files, fingerprint
 from hexacell.config.pending_write import held_config
 from hexacell.config.versions import ConfigEditedSince, compare_versions
 from hexacell.config.write_back import commit
 from hexacell.config.write_record import WriteCause, WriteKind, recorded_write, stated_reason
-from hexacell.errors import FileError, LimitError, UsageError
+from hexacell.errors import FileError, HexacellError, LimitError, UsageError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import ParameterSet
 from hexacell.results.written_geometry import TaskDisplacement
-from hexacell.runs.run_folder import RunFolder
+from hexacell.runs.run_folder import RunFolder, runs_folder
+from hexacell.services.history.journal_soundness import read_sound
+from hexacell.services.history.resumption import require_own_files
+from hexacell.services.run.replay_run import replay
 from hexacell.verdict.acceptance_gates import AcceptanceGate
-from procedures.journal.journal import RESTORE, now, read_journal
+from procedures.journal.journal import RESTORE, now, read_entries
+from procedures.replay.replayer import Scope, is_outcome
 from procedures.resources.controller_config import holds_provisional
 from procedures.run.questions import Operator, Question, ask_approval
-from procedures.run.state import RunState, fold
+from procedures.run.state import RunState
 from procedures.steps import events
 from procedures.steps.commit import pending_change
 
 COMMAND = "the command"
 """Who approves what needs no person: who typed ``apply``."""
 
+COMPUTED = (events.NoiseMeasured, events.Identified, events.Proposed, events.ResultValidated)
+"""Events on which a proposal and its gates stand; a step computes each of them from the records."""
 
-class LaterApproval(JsonRecord):
-    """Who had a proposal written after its run, and when: ``applied.json`` in the run folder."""
-
-    noun: ClassVar[str] = "approval of a proposal"
-
-    by: str
-    at: datetime
-    sha256_after: str
+SAME = 1e-6
+"""Largest difference of a number computed again: another computer may round otherwise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,25 +76,86 @@ class AppliedProposal:
 
 
 def read_proposal(folder: RunFolder) -> Proposal:
-    """The proposal of a run; raises ``UsageError`` without one, ``FileError`` for files that do not fit."""
-    state = fold(read_journal(folder.journal))
-    if state.started is None or state.proposed is None or not folder.proposal.exists():
-        raise UsageError(
-            "this run proposed no change of a config",
-            subject=folder.path,
-            action="Name a calibration that identified a geometry",
-        )
+    """The proposal of a run of the cell beside it.
+
+    Raises:
+        UsageError: it proposed nothing, or is not of that cell.
+        FileError: its files do not fit together.
+    """
+    started = next((entry.event for entry in read_entries(folder.journal)), None)
+    if not isinstance(started, events.RunStarted) or not folder.proposal.exists():
+        raise _without(folder)
+    cell = _own_cell(folder, started)
+    _, state = read_sound(folder, cell.settings)
+    if state.proposed is None:
+        raise _without(folder)
     change = ConfigChange.load(folder.proposal)
-    _require_together(folder, state.started, state.proposed, change)
-    settings = load_cell(folder.cell_file).settings
+    _require_together(folder, started, state.proposed, change)
+    require_own_files(cell, folder, state)
     return Proposal(
         folder,
-        state.started.cell,
-        change,
+        started.cell,
+        change.to_files(cell.config_paths),
         (*state.proposed.gates, _verification_gate(state)),
-        ConfigLayout.of(settings),
-        settings.mechanism.parameters,
+        ConfigLayout.of(cell.settings),
+        cell.settings.mechanism.parameters,
         state,
+    )
+
+
+def _without(folder: RunFolder) -> UsageError:
+    return UsageError(
+        "this run proposed no change of a config",
+        subject=folder.path,
+        action="Name a calibration that identified a geometry",
+    )
+
+
+def _own_cell(folder: RunFolder, started: events.RunStarted) -> Cell:
+    """The cell that made a run folder: its file is beside ``runs``, as it was when the run began."""
+    for path in sorted(folder.siblings.parent.parent.glob("*.toml")):
+        with suppress(HexacellError):
+            cell = load_cell(path)
+            is_its = runs_folder(cell).resolve() == folder.siblings.resolve()
+            if is_its and cell.text_without_secrets == started.cell_text:
+                return cell
+    raise UsageError(
+        "the cell file that this run began with is not beside it",
+        subject=folder.path,
+        action="Name the folder in `runs` beside the cell file, and undo what has changed in that since",
+    )
+
+
+async def require_as_recorded(proposal: Proposal) -> None:
+    """Compute the proposal and what its gates stand on again from the records of the run.
+
+    Raises:
+        FileError: the records give something else than the folder says.
+    """
+    step = None
+    for entry in read_entries(proposal.folder.journal):
+        match entry.event:
+            case events.StepBegun():
+                step = entry.event.step
+            case event if isinstance(event, COMPUTED) and (step is None or not is_outcome(step, event)):
+                raise _not_its_records(proposal, entry.number)
+    found = await replay(proposal.folder.path, Scope.RESULTS, SAME)
+    if wrong := next(filter(found.counts, found.differences), None):
+        raise _not_its_records(proposal, wrong.line)
+    if found.change is None or found.change.after_contents != proposal.change.after_contents:
+        raise FileError(
+            "this text is not the one that the records give",
+            subject=proposal.folder.proposal,
+            action=RESTORE,
+        )
+
+
+def _not_its_records(proposal: Proposal, line: int) -> FileError:
+    return FileError(
+        "the records of the run give something else than this line says",
+        subject=proposal.folder.journal,
+        line=line,
+        action=f"`hexacell replay` shows what. {RESTORE}",
     )
 
 
@@ -113,6 +178,7 @@ async def apply_proposal(
         LimitError: a gate refuses it, or the person declined.
         AnswerNeeded: a person must accept it, and nobody is there.
         ConfigEditedSince: the config was edited since the run began.
+        FileError: the records do not give it.
         CellBusy, FileError, WriteBackUndone: see :func:`~hexacell.config.write_back.commit`.
     """
     change, reason = proposal.change, stated_reason(reason)
@@ -120,9 +186,10 @@ async def apply_proposal(
         if fingerprint(*change.paths) == change.sha256_after:
             return AppliedProposal(proposal, "")
         _require_unedited(proposal)
+        await require_as_recorded(proposal)
         by = await _approval(proposal, operator, typed_by)
         approval = LaterApproval(by=by, at=now()[0], sha256_after=change.sha256_after)
-        approval.save(_approval_path(proposal.folder), like=change.path)
+        approval.save(approval_path(proposal.folder), like=change.path)
         judged = proposal.state.judged
         outcome = "not verified by its run" if judged is None else judged.line
         cause = WriteCause(WriteKind.APPLIED, by, proposal.folder.name, outcome, reason)
@@ -131,19 +198,9 @@ async def apply_proposal(
             with recorded_write(folder, change.paths, layout, cause) as recording:
                 commit(change, proposal.folder.path)
         except BaseException:
-            _approval_path(proposal.folder).unlink(missing_ok=True)
+            approval_path(proposal.folder).unlink(missing_ok=True)
             raise
     return AppliedProposal(proposal, by, recording.problem)
-
-
-def later_approval(folder: RunFolder) -> LaterApproval | None:
-    """Who had the proposal of a run written after it; None if nobody did. Raises ``FileError``."""
-    path = _approval_path(folder)
-    return LaterApproval.load(path) if path.exists() else None
-
-
-def _approval_path(folder: RunFolder) -> Path:
-    return folder.path / "applied.json"
 
 
 async def _approval(proposal: Proposal, operator: Operator | None, typed_by: str) -> str:

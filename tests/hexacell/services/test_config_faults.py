@@ -20,6 +20,8 @@ from procedures.engine.commands import UnattendedOperator
 from tests.hexacell.config.conftest import Faults
 from tests.hexacell.services.proposed_runs import ProposedRun, propose_run
 
+pytestmark = pytest.mark.usefixtures("records_agree")
+
 Job = Callable[[], object]
 
 

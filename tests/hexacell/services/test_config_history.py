@@ -26,6 +26,8 @@ from procedures.steps import events
 from tests.hexacell.services.proposed_runs import ProposedRun, propose_run
 from tests.recorded_events import record
 
+pytestmark = pytest.mark.usefixtures("records_agree")
+
 
 @pytest.fixture
 def records(cell) -> Path:

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from hexacell.config.change import Receipt
+from hexacell.config.later_approval import later_approval
 from hexacell.config.layout import ConfigLayout
 from hexacell.config.versions import ConfigEditedSince
 from hexacell.config.write_record import NumberChange
@@ -24,7 +25,7 @@ from hexacell.runs.cell_lock import cell_lock
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services.write_back.config_history import config_history
 from hexacell.services.write_back.config_rollback import roll_back_config
-from hexacell.services.write_back.proposals import COMMAND, apply_proposal, later_approval, read_proposal
+from hexacell.services.write_back.proposals import COMMAND, apply_proposal, read_proposal
 from hexacell.storage import atomic_files
 from hexacell.text.config_changes import applied_text, versions_text
 from hexacell.text.screens.questions import question_view
@@ -33,6 +34,8 @@ from hexacell.verdict.decision import Verdict
 from procedures.engine.commands import UnattendedOperator
 from procedures.run.questions import PendingChange, Question
 from tests.hexacell.services.proposed_runs import MET, ProposedRun, propose_run
+
+pytestmark = pytest.mark.usefixtures("records_agree")
 
 DOUBTFUL = AcceptanceGate(
     name="agrees with the noise", passed=False, sentence="Doubtful: 1.4 times.", needs_person=True

@@ -94,10 +94,9 @@ class ConfigChange(JsonRecord):
 
     def to_files(self, paths: Sequence[Path]) -> Self:
         """The same change of other files, such as those of a machine's folder that was copied."""
-        first, *others = (path.absolute() for path in paths)
-        further = zip(self.further, others, strict=True)
-        moved = tuple(one.model_copy(update={"path": path}) for one, path in further)
-        return self.model_copy(update={"path": first, "further": moved})
+        files = zip(self.further, paths[1:], strict=False)
+        further = tuple(one.model_copy(update={"path": path.absolute()}) for one, path in files)
+        return self.model_copy(update={"path": paths[0].absolute(), "further": further})
 
     @property
     def before_contents(self) -> Contents:

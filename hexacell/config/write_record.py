@@ -15,18 +15,20 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from hexacell.cell.fields import LONGEST_TEXT, Finite, Frozen, Text
+from hexacell.config.change import JsonRecord
 from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import ConfigLayout, fingerprint
 from hexacell.config.versions import config_if_readable, numbers_of
 from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.kinematics.parameters import ParameterUnit
 from hexacell.runs.cell_lock import user_name
+from hexacell.runs.run_folder import RunFolder
 from hexacell.storage import atomic_files
 
 RECORDS = "config-writes.jsonl"
@@ -238,3 +240,24 @@ def _append(descriptor: int, path: Path, line: bytes) -> None:
         with suppress(OSError):
             os.ftruncate(descriptor, status.st_size)
         raise
+
+
+class LaterApproval(JsonRecord):
+    """Who had a proposal written after its run, and when: ``applied.json`` in the run folder."""
+
+    noun: ClassVar[str] = "approval of a proposal"
+
+    by: str
+    at: datetime
+    sha256_after: str
+
+
+def later_approval(folder: RunFolder) -> LaterApproval | None:
+    """Who had the proposal of a run written after it; None if nobody did. Raises ``FileError``."""
+    path = approval_path(folder)
+    return LaterApproval.load(path) if path.exists() else None
+
+
+def approval_path(folder: RunFolder) -> Path:
+    """Where that is noted."""
+    return folder.path / "applied.json"

@@ -130,13 +130,7 @@ def write_atomically(
 
 
 def write_own(path: Path, data: bytes, *, like: Path | None = None) -> None:
-    """Replace or create a file of the program's own, as :func:`write_atomically`, but through no link.
-
-    Its folder may come from elsewhere, with a link in the place of the file.
-
-    Raises:
-        FileError: there is a link, or it cannot be written.
-    """
+    """Replace or create a file in a folder that may come from elsewhere, through no link; ``FileError``."""
     require_no_link(path)
     write_atomically(path, data, like=like)
 
@@ -144,9 +138,8 @@ def write_own(path: Path, data: bytes, *, like: Path | None = None) -> None:
 def require_no_link(path: Path) -> None:
     """Raise ``FileError`` if a file of the program's own is a link."""
     with os_errors("cannot be written and is unchanged", path):
-        is_link = path.is_symlink()
-    if is_link:
-        raise FileError("is a link; a file of the program's own is none", subject=path, action="Remove it")
+        if path.is_symlink():
+            raise FileError("is a link, and none may be here", subject=path, action="Remove it")
 
 
 def require_replaceable(path: Path) -> None:

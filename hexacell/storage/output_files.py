@@ -15,25 +15,15 @@ from hexacell.errors import FileError
 from hexacell.storage.atomic_files import NOT_FOR_OTHERS, os_errors, write_atomically
 
 RUN_JOURNAL = "journal.jsonl"
-"""Name of the file that makes a folder that of a run."""
-
-_OWN_NOTES = ".hexacell-"
-"""Is in the names of locks and notes, which may be empty."""
-
 _SEARCHED_BYTES = 1 << 16
-_ANOTHER = "Name a new file"
 
 
 @dataclass(frozen=True, slots=True)
 class OutputKind:
-    """What an option writes.
+    """What an option writes, and whether it may be put into a run folder.
 
-    Attributes:
-        noun: what it is, for messages.
-        mark: what the first or the last bytes of each such file have and no other's; None where the file
-            must be new.
-        mode: the permissions of a new file that is written bit by bit.
-        may_be_in_run: whether it may be put into a run folder.
+    ``mark`` is in the first or the last bytes of each such file; None where the file must be new. ``mode``
+    has the permissions of a new file that is written bit by bit.
     """
 
     noun: str
@@ -67,16 +57,14 @@ class OutputFile:
     path: Path
     kind: OutputKind
 
-    def require(self) -> bytes | None:
-        """What the file holds that is to be replaced; None if there is none, or it is a pipe or a device.
+    def require(self) -> None:
+        """Refuse a file that this option did not write, a link to nothing, and the folder of a run.
 
         Raises:
-            FileError: there is a file that this option did not write, a link to nothing, or it is the
-                folder of a run.
+            FileError: it is one of these, or cannot be read.
         """
         with os_errors("cannot be written", self.path):
-            target = Path(os.path.realpath(self.path))
-            is_link = self.path.is_symlink()
+            target, is_link = Path(os.path.realpath(self.path)), self.path.is_symlink()
             if not self.kind.may_be_in_run and os.path.lexists(target.parent / RUN_JOURNAL):
                 raise self._refusal("is in the folder of a run, which keeps only what the run wrote")
             if is_link and os.path.lexists(self.path.parent / RUN_JOURNAL):
@@ -86,50 +74,41 @@ class OutputFile:
             except (FileNotFoundError, NotADirectoryError):
                 if is_link:
                     raise self._refusal("is a link to nothing") from None
-                return None
-            if not stat.S_ISREG(status.st_mode):
-                return None
-            data = target.read_bytes()
-        self._require_ours(data[:_SEARCHED_BYTES] + data[-_SEARCHED_BYTES:])
-        return data
+                return
+            if stat.S_ISREG(status.st_mode):
+                with target.open("rb") as stream:
+                    first = stream.read(_SEARCHED_BYTES)
+                    stream.seek(max(0, status.st_size - _SEARCHED_BYTES))
+                    self._require_ours(first + stream.read(_SEARCHED_BYTES))
 
     def write(self, data: bytes, *, for_everybody: bool = False) -> None:
         """Write a whole file in one step; raises ``FileError`` as :meth:`require` and if it cannot be."""
-        found = self.require()
-        write_atomically(self.path, data, expected=found, for_everybody=for_everybody)
+        self.require()
+        write_atomically(self.path, data, for_everybody=for_everybody)
 
     def open_stream(self, *, appends: bool = False, waits: bool = True) -> int:
         """A descriptor for what is written bit by bit; the file is emptied first, unless one ``appends``.
 
-        With ``waits`` a pipe waits for its reader.
-
-        Raises:
-            OSError: it cannot be opened.
-            FileError: as :meth:`require`.
+        With ``waits`` a pipe waits for its reader. Raises ``OSError``, or ``FileError`` as :meth:`require`.
         """
         self.require()
-        flags = os.O_CLOEXEC | (os.O_APPEND if appends else 0) | (0 if waits else os.O_NONBLOCK)
+        flags = (os.O_APPEND if appends else 0) | (0 if waits else os.O_NONBLOCK)
+        flags |= os.O_WRONLY | os.O_CLOEXEC
         try:
-            return os.open(self.path, flags | os.O_WRONLY | os.O_CREAT | os.O_EXCL, self.kind.mode)
+            return os.open(self.path, flags | os.O_CREAT | os.O_EXCL, self.kind.mode)
         except FileExistsError:
-            is_file = self.path.is_file()  # a pipe opened for reading, too, would never miss its reader
-        descriptor = os.open(self.path, flags | (os.O_RDWR if is_file else os.O_WRONLY))
-        try:
-            if stat.S_ISREG(os.fstat(descriptor).st_mode):
-                self._require_ours(os.pread(descriptor, _SEARCHED_BYTES, 0))
-                if not appends:
-                    os.ftruncate(descriptor, 0)
-        except BaseException:
-            os.close(descriptor)
-            raise
+            descriptor = os.open(self.path, flags)
+        if not appends and stat.S_ISREG(os.fstat(descriptor).st_mode):
+            os.ftruncate(descriptor, 0)
         return descriptor
 
     def _require_ours(self, data: bytes) -> None:
         mark = self.kind.mark
         if mark is None:
             raise self._refusal("is there already")
-        if (data or _OWN_NOTES in self.path.name) and mark.search(data) is None:
+        # An empty file is nobody's, but for locks.
+        if (data or ".hexacell-" in self.path.name) and mark.search(data) is None:
             raise self._refusal(f"holds something else than {self.kind.noun}, and is left as it is")
 
     def _refusal(self, problem: str) -> FileError:
-        return FileError(problem, subject=self.path, action=_ANOTHER)
+        return FileError(problem, subject=self.path, action="Name a new file")

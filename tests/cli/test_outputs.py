@@ -2,7 +2,6 @@
 
 import argparse
 import os
-import shutil
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -23,20 +22,18 @@ READ = {"devices --cell", "fit --measurements", "next --measurements", "report -
 FOLDERS = {"demo --folder", "host --folder", "replay --export", "schedule --folder", "study --folder"}
 """Options that name folders to write into; tests below, or those of the command, say what they refuse."""
 
-ARGUMENTS = {
-    "run": ("CELL",),
+ARGUMENTS = dict.fromkeys(("run", "simulate", "status"), ("CELL",)) | {
     "report": ("RUN",),
-    "simulate": ("CELL",),
-    "status": ("CELL",),
     "schedule": ("CELL", "--daily", "02:30"),
     "devices": (),
 }
 """What else a command with an output is given."""
 
 
-def options_with_paths(
-    parser: argparse.ArgumentParser, path: str = ""
-) -> Iterator[tuple[str, str, object]]:
+Option = tuple[str, str, object]
+
+
+def options_with_paths(parser: argparse.ArgumentParser, path: str = "") -> Iterator[Option]:
     """Command, option and value of every option that names a file or a folder."""
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
@@ -81,27 +78,14 @@ def test_no_output_replaces_a_cell_a_config_a_journal_or_a_note(
     assert not (tmp_path / "absent").exists()
 
 
-def test_a_file_for_metrics_that_was_forgotten_costs_no_cell(cell_folder, typed_here) -> None:
-    other = cell_folder.path / "other.toml"
-    shutil.copy(cell_folder.cell, other)
-    before = other.read_bytes()
-    assert typed_here("status", "--metrics", other, cell_folder.cell).code == 2
-    assert other.read_bytes() == before
-
-
 def test_what_an_option_wrote_before_it_writes_again(tmp_path) -> None:
-    events = OutputFile(tmp_path / "events", EVENTS)
-    for _ in range(2):
-        descriptor = events.open_stream()
-        os.write(descriptor, b'{"n":1,"version":1,"at":"2026-11-27T00:00:00.000Z"\n')
-        os.close(descriptor)
-    log = OutputFile(tmp_path / "log", LOG)
-    for _ in range(2):
-        descriptor = log.open_stream(appends=True)
-        os.write(descriptor, b"2026-11-27T00:00:00.000Z INFO hexacell: x\n")
-        os.close(descriptor)
-    assert len(events.path.read_bytes().splitlines()) == 1
-    assert len(log.path.read_bytes().splitlines()) == 2
+    event, line = b'{"n":1,"version":1,"at":"2026-', b"2026-11-27T00:00:00.000Z INFO hexacell: x"
+    for kind, text, lines in ((EVENTS, event, 1), (LOG, line, 2)):
+        output = OutputFile(tmp_path / kind.noun, kind)
+        for _ in range(2):
+            with os.fdopen(output.open_stream(appends=kind is LOG), "wb") as stream:
+                stream.write(text + b"\n")
+        assert len(output.path.read_bytes().splitlines()) == lines
     linked = tmp_path / "linked.prom"
     linked.symlink_to(tmp_path / "cell.prom")
     (tmp_path / "cell.prom").touch()
@@ -129,32 +113,27 @@ def test_an_empty_lock_is_nobodys_to_replace(tmp_path) -> None:
     (tmp_path / "journal.jsonl").touch()
     with pytest.raises(FileError, match="folder of a run"):
         OutputFile(tmp_path / "new", METRICS).require()
-    assert OutputFile(tmp_path / "new.html", REPORT).require() is None
+    OutputFile(tmp_path / "new.html", REPORT).require()
 
 
 def test_a_file_of_its_own_is_written_through_no_link(tmp_path) -> None:
-    for target in ("present", "absent"):
-        (tmp_path / "present").write_text("precious")
-        (tmp_path / f"to-{target}").symlink_to(tmp_path / target)
-        with pytest.raises(FileError, match="is a link"):
-            write_own(tmp_path / f"to-{target}", b"x")
-    assert (tmp_path / "present").read_text() == "precious"
+    (tmp_path / "link").symlink_to(tmp_path / "absent")
+    with pytest.raises(FileError, match="is a link"):
+        write_own(tmp_path / "link", b"x")
     assert not (tmp_path / "absent").exists()
 
 
-def test_folders_that_a_study_or_a_demo_is_to_work_in_keep_what_is_theirs(typed_here, tmp_path) -> None:
-    for name, content in (("paper.svg", "<svg/>"), ("paper.jsonl", "precious")):
-        (tmp_path / name).write_text(content)
-        assert typed_here("study", "paper", "--draws", "1", "--folder", tmp_path).code == 2
-        assert (tmp_path / name).read_text() == content
-        (tmp_path / name).rename(tmp_path / f"kept-{name}")
-        (tmp_path / name).symlink_to(tmp_path / f"kept-{name}")
-        assert typed_here("study", "paper", "--draws", "1", "--folder", tmp_path).code == 2
-        assert (tmp_path / name).read_text() == content
-        (tmp_path / name).unlink()
-    (tmp_path / ".hexacell-demo").symlink_to(tmp_path / "kept-paper.svg")
+@pytest.mark.parametrize(("name", "content"), [("paper.svg", "<svg/>"), ("paper.jsonl", "precious")])
+def test_a_folder_keeps_what_no_study_or_demo_made(typed_here, tmp_path, name, content: str) -> None:
+    theirs, kept = tmp_path / name, tmp_path / "kept"
+    theirs.write_text(content)
+    assert typed_here("study", "paper", "--draws", "1", "--folder", tmp_path).code == 2
+    theirs.rename(kept)
+    for link in (theirs, tmp_path / ".hexacell-demo"):
+        link.symlink_to(kept)
+    assert typed_here("study", "paper", "--draws", "1", "--folder", tmp_path).code == 2
     assert typed_here("demo", "--folder", tmp_path).code == 2
-    assert (tmp_path / "kept-paper.svg").read_text() == "<svg/>"
+    assert kept.read_text() == content
 
 
 def test_an_index_that_is_a_link_makes_no_file_and_the_runs_are_listed(cell, typed_here, tmp_path) -> None:

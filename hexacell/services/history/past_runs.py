@@ -176,7 +176,4 @@ def _delete(path: Path) -> None:
 
 def _remove(path: Path) -> None:
     with os_errors("cannot be deleted", path):
-        if path.is_symlink():
-            path.unlink()  # of a run that is elsewhere, and stays
-        else:
-            shutil.rmtree(path)
+        path.unlink() if path.is_symlink() else shutil.rmtree(path)

@@ -66,24 +66,19 @@ def _interrupted_at(run: RunFolder) -> datetime | None:
     return entries[-1].at if entries and not is_over else None
 
 
-def require_own_run(cell: Cell, folder: RunFolder, state: RunState) -> None:
-    """Check a run folder before its run is resumed; ``state`` is by its journal.
+def require_own_run(cell: Cell, folder: RunFolder, state: RunState, *, is_resumed: bool = True) -> None:
+    """Check a run folder before its run is resumed, or applied; ``state`` is by its journal.
 
     Raises ``FileError`` if a file in it is a link, names another config, or has a geometry or a pose that
     is not of this robot.
     """
-    require_own_files(cell, folder, state)
-    if folder.proposal.exists():
-        _require_own_config(cell, folder.proposal, ConfigChange.load(folder.proposal).paths)
-
-
-def require_own_files(cell: Cell, folder: RunFolder, state: RunState) -> None:
-    """The same without the proposal, whose files a person's later ``apply`` does not take from there."""
     folders = (folder.path, folder.path / PROVISIONAL_FOLDER)
     for path in folders:
         _require_no_links(path)
         if (path / RECEIPT).exists():
             _require_own_config(cell, path / RECEIPT, Receipt.of(path).paths)
+    if is_resumed and folder.proposal.exists():  # what applies it later names no file by it
+        _require_own_config(cell, folder.proposal, ConfigChange.load(folder.proposal).paths)
     assert state.started is not None  # noqa: S101 - a journal without a start is not resumed
     _require_own_geometry(cell, folder, state, state.started)
     _require_own_poses(cell, folder, state, state.started)

@@ -9,7 +9,7 @@ import numpy as np
 from hexacell.cell.model import CellSettings
 from hexacell.checks.change_alarm import has_silent_leg, machine_records
 from hexacell.config.change import RECEIPT, Receipt
-from hexacell.config.later_approval import later_approval
+from hexacell.config.write_record import later_approval
 from hexacell.errors import HexacellError, UsageError
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MEASURED_PARTS, MeasurementSet, RecordId

@@ -6,8 +6,8 @@ from pathlib import Path
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.loader import Cell
 from hexacell.config.change import Receipt
-from hexacell.config.later_approval import later_approval
 from hexacell.config.layout import fingerprint
+from hexacell.config.write_record import later_approval
 from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.results.result import AcceptedResult, IdentificationResult, LengthResult

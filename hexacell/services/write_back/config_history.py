@@ -12,8 +12,14 @@ from pathlib import Path
 
 from hexacell.cell.loader import Cell
 from hexacell.config.change import Receipt
-from hexacell.config.later_approval import later_approval
-from hexacell.config.write_record import RECORDS, THE_RUN, WriteKind, WriteRecord, read_records
+from hexacell.config.write_record import (
+    RECORDS,
+    THE_RUN,
+    WriteKind,
+    WriteRecord,
+    later_approval,
+    read_records,
+)
 from hexacell.errors import HexacellError
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.write_back.config_rollback import receipts_of

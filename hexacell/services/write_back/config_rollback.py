@@ -113,17 +113,12 @@ def _written_files(cell: Cell, named: str) -> tuple[tuple[Path, ...], Contents]:
     if not are_same_files(receipt.paths, cell.config_paths):
         raise UsageError(
             f"the run {folder.path} is of another config, {' and '.join(map(str, receipt.paths))}",
-            action=_by_hand(receipt.kept(AFTER), "if it is one of this machine"),
+            action=f"If it is of this machine, copy {receipt.kept(AFTER)[0]} over the config by hand",
         )
     written = receipt.kept(AFTER)
     if link := next((path for path in written if path.is_symlink()), None):
         raise FileError("this copy of the config is damaged", subject=link, action=RESTORE)
     return written, receipt.written()
-
-
-def _by_hand(copies: tuple[Path, ...], when: str) -> str:
-    """How a person restores a version that the program may not."""
-    return f"Copy {' and '.join(map(str, copies))} over the config by hand, {when}"
 
 
 def _require_known(
@@ -138,7 +133,7 @@ def _require_known(
         raise UsageError(
             "no run of this cell wrote it: it would be lost",
             subject=path,
-            action=_by_hand(restored, "once there is a copy of it elsewhere"),
+            action=f"Keep a copy elsewhere, then copy {restored[0]} over it by hand",
         )
     raise _edited_since(cell, receipts[-1])
 

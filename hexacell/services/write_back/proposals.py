@@ -11,26 +11,32 @@ from pathlib import Path
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.config.change import ConfigChange
 from hexacell.config.interface import ControllerGeometry
-from hexacell.config.later_approval import LaterApproval, approval_path
 from hexacell.config.layout import ConfigLayout, are_same_files, fingerprint
 from hexacell.config.pending_write import held_config
 from hexacell.config.versions import ConfigEditedSince, compare_versions
 from hexacell.config.write_back import commit
-from hexacell.config.write_record import WriteCause, WriteKind, recorded_write, stated_reason
+from hexacell.config.write_record import (
+    LaterApproval,
+    WriteCause,
+    WriteKind,
+    approval_path,
+    recorded_write,
+    stated_reason,
+)
 from hexacell.errors import FileError, HexacellError, LimitError, UsageError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import ParameterSet
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.runs.run_folder import RunFolder, runs_folder
-from hexacell.services.history.journal_soundness import read_sound
-from hexacell.services.history.resumption import require_own_files
+from hexacell.services.history.journal_soundness import require_sound
+from hexacell.services.history.resumption import require_own_run
 from hexacell.services.run.replay_run import replay
 from hexacell.verdict.acceptance_gates import AcceptanceGate
-from procedures.journal.journal import RESTORE, now, read_entries
+from procedures.journal.journal import RESTORE, now, read_entries, read_journal
 from procedures.replay.replayer import Scope, is_outcome
 from procedures.resources.controller_config import holds_provisional
 from procedures.run.questions import Operator, Question, ask_approval
-from procedures.run.state import RunState
+from procedures.run.state import RunState, fold
 from procedures.steps import events
 from procedures.steps.commit import pending_change
 
@@ -82,16 +88,20 @@ def read_proposal(folder: RunFolder) -> Proposal:
         UsageError: it proposed nothing, or is not of that cell.
         FileError: its files do not fit together.
     """
-    started = next((entry.event for entry in read_entries(folder.journal)), None)
-    if not isinstance(started, events.RunStarted) or not folder.proposal.exists():
-        raise _without(folder)
+    history = read_journal(folder.journal)
+    state = fold(history)
+    started = state.started
+    if started is None or state.proposed is None or not folder.proposal.exists():
+        raise UsageError(
+            "this run proposed no change of a config",
+            subject=folder.path,
+            action="Name a calibration that identified a geometry",
+        )
     cell = _own_cell(folder, started)
-    _, state = read_sound(folder, cell.settings)
-    if state.proposed is None:
-        raise _without(folder)
+    require_sound(history, cell.settings, folder.journal, follows_plan=False)
     change = ConfigChange.load(folder.proposal)
     _require_together(folder, started, state.proposed, change)
-    require_own_files(cell, folder, state)
+    require_own_run(cell, folder, state, is_resumed=False)
     return Proposal(
         folder,
         started.cell,
@@ -103,21 +113,13 @@ def read_proposal(folder: RunFolder) -> Proposal:
     )
 
 
-def _without(folder: RunFolder) -> UsageError:
-    return UsageError(
-        "this run proposed no change of a config",
-        subject=folder.path,
-        action="Name a calibration that identified a geometry",
-    )
-
-
 def _own_cell(folder: RunFolder, started: events.RunStarted) -> Cell:
     """The cell that made a run folder: its file is beside ``runs``, as it was when the run began."""
     for path in sorted(folder.siblings.parent.parent.glob("*.toml")):
         with suppress(HexacellError):
             cell = load_cell(path)
-            is_its = runs_folder(cell).resolve() == folder.siblings.resolve()
-            if is_its and cell.text_without_secrets == started.cell_text:
+            its = runs_folder(cell).resolve(), cell.text_without_secrets
+            if its == (folder.siblings.resolve(), started.cell_text):
                 return cell
     raise UsageError(
         "the cell file that this run began with is not beside it",
@@ -132,31 +134,21 @@ async def require_as_recorded(proposal: Proposal) -> None:
     Raises:
         FileError: the records give something else than the folder says.
     """
+    found = await replay(proposal.folder.path, Scope.RESULTS, SAME)
+    wrong = [one.line for one in found.differences if found.counts(one)]
     step = None
     for entry in read_entries(proposal.folder.journal):
-        match entry.event:
-            case events.StepBegun():
-                step = entry.event.step
-            case event if isinstance(event, COMPUTED) and (step is None or not is_outcome(step, event)):
-                raise _not_its_records(proposal, entry.number)
-    found = await replay(proposal.folder.path, Scope.RESULTS, SAME)
-    if wrong := next(filter(found.counts, found.differences), None):
-        raise _not_its_records(proposal, wrong.line)
-    if found.change is None or found.change.after_contents != proposal.change.after_contents:
+        if isinstance(entry.event, events.StepBegun):
+            step = entry.event.step
+        elif isinstance(entry.event, COMPUTED) and (step is None or not is_outcome(step, entry.event)):
+            wrong.append(entry.number)
+    if wrong or found.change is None or found.change.after_contents != proposal.change.after_contents:
         raise FileError(
-            "this text is not the one that the records give",
-            subject=proposal.folder.proposal,
-            action=RESTORE,
+            "the records of the run give another proposal",
+            subject=proposal.folder.journal,
+            line=min(wrong, default=None),
+            action="Calibrate again; `hexacell replay RUN` shows what differs",
         )
-
-
-def _not_its_records(proposal: Proposal, line: int) -> FileError:
-    return FileError(
-        "the records of the run give something else than this line says",
-        subject=proposal.folder.journal,
-        line=line,
-        action=f"`hexacell replay` shows what. {RESTORE}",
-    )
 
 
 def approval_question(proposal: Proposal) -> Question:

@@ -16,6 +16,7 @@ from hexacell.config.write_record import RECORDS
 from hexacell.runs.cell_lock import cell_lock
 from hexacell.services.write_back.config_rollback import roll_back_config
 from hexacell.services.write_back.proposals import apply_proposal, read_proposal
+from hexacell.storage.atomic_files import remove_stale_temporaries
 from procedures.engine.commands import UnattendedOperator
 from tests.hexacell.config.conftest import Faults
 from tests.hexacell.services.proposed_runs import ProposedRun, propose_run
@@ -76,6 +77,7 @@ def test_a_proposal_is_applied_whole_or_not_at_all(cell, stride: int) -> None:
         (run.folder.siblings / RECORDS).unlink(missing_ok=True)
         for name in ("applied.json", RECEIPT, "config-before", "config-after"):
             (run.folder.path / name).unlink(missing_ok=True)
+        remove_stale_temporaries(run.folder.path)  # each is looked at by the next one
 
     found = cut_at_calls(cell, prepare, lambda: applied(run), stride)
     assert set(found) == {run.before, run.after}

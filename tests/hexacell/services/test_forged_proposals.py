@@ -72,6 +72,14 @@ async def test_what_the_records_give_is_written_into_the_config_of_the_copy(prop
     assert finished.cell.config_path.read_bytes() == original
 
 
+def other(event: Any, **changes: Any) -> Any:
+    return event.model_copy(update=changes)
+
+
+def moved(document: dict[str, Any]) -> dict[str, Any]:
+    return {**document, "l": tuple(one + 0.5 for one in document["l"])}
+
+
 def text(copied: Copied) -> None:
     copied.propose(text_after=ConfigChange.load(copied.folder.proposal).text_after + "# and more\n")
 
@@ -81,51 +89,34 @@ def path(copied: Copied) -> None:
 
 
 def gates(copied: Copied) -> None:
-    def fewer(event: events.Proposed) -> events.Proposed:
-        return event.model_copy(update={"gates": event.gates[:1]})
-
-    copied.change(events.Proposed, fewer)
-
-
-def moved(document: dict[str, Any]) -> dict[str, Any]:
-    return {**document, "l": tuple(one + 0.5 for one in document["l"])}
+    copied.change(events.Proposed, lambda event: other(event, gates=event.gates[:1]))
 
 
 def geometry(copied: Copied) -> None:
-    def other(event: events.Proposed) -> events.Proposed:
-        return event.model_copy(update={"written": moved(event.written)})
-
-    copied.change(events.Proposed, other)
-    change = ConfigChange.load(copied.folder.proposal)
-    copied.propose(after=moved(change.after))
+    copied.change(events.Proposed, lambda event: other(event, written=moved(event.written)))
+    copied.propose(after=moved(ConfigChange.load(copied.folder.proposal).after))
 
 
 def identified(copied: Copied) -> None:
-    def other(event: events.Identified) -> events.Identified:
-        result = event.result.model_copy(update={"geometry": moved(event.result.geometry)})
-        return event.model_copy(update={"result": result})
+    def changed(event: events.Identified) -> Any:
+        return other(event, result=other(event.result, geometry=moved(event.result.geometry)))
 
-    copied.change(events.Identified, other)
+    copied.change(events.Identified, changed)
 
 
 def records(copied: Copied) -> None:
-    entries: list[Any] = list(read_entries(copied.folder.journal))
-    until = next(n for n, entry in enumerate(entries) if isinstance(entry.event, events.Identified))
-    place = max(n for n in range(until) if isinstance(entries[n].event, events.RecordTaken))
-    taken = entries[place].event
-    mm = tuple(one + 0.2 for one in taken.reading.gauges_mm)
-    reading = taken.reading.model_copy(update={"gauges_mm": mm})
-    entries[place] = replace(entries[place], event=taken.model_copy(update={"reading": reading}))
-    copied.folder.journal.write_bytes(b"".join(map(encode, entries)))
+    def changed(event: events.RecordTaken) -> Any:
+        mm = tuple(one + 0.2 for one in event.reading.gauges_mm)
+        return other(event, reading=other(event.reading, gauges_mm=mm))
+
+    copied.change(events.RecordTaken, changed)
 
 
 def verdict(copied: Copied) -> None:
-    def better(event: events.ResultValidated) -> events.ResultValidated:
-        assert event.verification is not None
-        checked = event.verification.model_copy(update={"after_mm": 0.0})
-        return event.model_copy(update={"verification": checked})
+    def changed(event: events.ResultValidated) -> Any:
+        return other(event, verification=other(event.verification, after_mm=0.0))
 
-    copied.change(events.ResultValidated, better)
+    copied.change(events.ResultValidated, changed)
 
 
 def steps(copied: Copied) -> None:
@@ -141,7 +132,7 @@ async def test_a_forged_folder_is_refused(proposed, forge: Callable[[Copied], No
     (proposed.cell.path.parent / "victim").write_bytes(proposed.config)
     before = proposed.config
     forge(proposed)
-    with pytest.raises(FileError, match=r"records|journal|this text"):
+    with pytest.raises(FileError, match=r"give another proposal|not the one of its journal"):
         await applied(proposed)
     assert proposed.config == (proposed.cell.path.parent / "victim").read_bytes() == before
 
@@ -181,4 +172,4 @@ def test_where_the_program_may_not_restore_a_version_it_says_how_a_person_does(c
     with pytest.raises(UsageError, match="is of another config") as refused:
         roll_back_config(calibrated.cell, calibrated.folder.name)
     assert refused.value.action is not None
-    assert f"Copy {calibrated.folder.path / AFTER} over the config by hand" in refused.value.action
+    assert f"copy {calibrated.folder.path / AFTER} over the config by hand" in refused.value.action

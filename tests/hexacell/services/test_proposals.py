@@ -7,10 +7,9 @@ from typing import Any
 import pytest
 
 from hexacell.config.change import Receipt
-from hexacell.config.later_approval import later_approval
 from hexacell.config.layout import ConfigLayout
 from hexacell.config.versions import ConfigEditedSince
-from hexacell.config.write_record import NumberChange
+from hexacell.config.write_record import NumberChange, later_approval
 from hexacell.errors import (
     AnswerNeeded,
     CellBusy,

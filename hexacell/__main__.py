@@ -3,7 +3,7 @@
 import sys
 import warnings
 
-from hexacell.cli import app
+from hexacell.python_process import leave_working_folder_out
 
 
 def main() -> int:
@@ -13,8 +13,11 @@ def main() -> int:
     """
     if not sys.warnoptions:
         warnings.simplefilter("ignore", RuntimeWarning)
+    from hexacell.cli import app  # noqa: PLC0415 - only after the working folder is left out
+
     return app.main()
 
 
 if __name__ == "__main__":
+    leave_working_folder_out()
     sys.exit(main())

@@ -2,7 +2,6 @@
 
 import asyncio
 import os
-import sys
 import tempfile
 from asyncio import StreamReader, StreamWriter
 from collections.abc import AsyncIterator, Sequence
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import BinaryIO, Protocol
 
 from hexacell.errors import ExitCode, FileError, HexacellError
+from hexacell.python_process import python_command
 from hexacell.run_process import messages as protocol
 from hexacell.run_process.run_socket import peer_of
 from procedures.engine.commands import Command
@@ -165,9 +165,9 @@ def _spawn(arguments: Sequence[str]) -> None:
             (os.POSIX_SPAWN_DUP2, answering, 1),
             (os.POSIX_SPAWN_DUP2, errors.fileno(), 2),
         ]
-        command = [sys.executable, "-m", "hexacell", "host", *arguments]
+        command = python_command("hexacell", "host", *arguments)
         try:
-            process = os.posix_spawn(sys.executable, command, os.environ, file_actions=streams, setsid=True)
+            process = os.posix_spawn(command[0], command, os.environ, file_actions=streams, setsid=True)
         finally:
             os.close(answering)
         os.waitpid(process, 0)

@@ -10,6 +10,7 @@ from hexacell.cell.fields import Frozen
 from hexacell.cell.loader import load_cell
 from hexacell.dry_run.campaign import VisitedPose
 from hexacell.errors import HexacellError
+from hexacell.python_process import python_command
 from hexacell.services.offline import try_plan
 from hexacell.services.run.calibration_run import preflight
 from hexacell.text.planning import device_line, plan_trial_lines
@@ -42,7 +43,7 @@ async def run_child(wanted: type[Found], cell: Path, mode: str = "") -> Found:
         HexacellError: it gave nothing.
     """
     what = "plan" if wanted is TriedPlan else "preflight"
-    command = (sys.executable, "-m", __name__, what, str(cell), mode)
+    command = python_command(__name__, what, str(cell), mode)
     process = await asyncio.create_subprocess_exec(*command, stdin=DEVNULL, stdout=PIPE, stderr=DEVNULL)
     try:
         printed, _ = await process.communicate()

@@ -17,6 +17,7 @@ from typing import Generic, TypeVar, cast
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from hexacell.errors import FileError, HexacellError
+from hexacell.python_process import keep_working_folder_out_of_workers
 from hexacell.storage import atomic_files
 
 TaskType = TypeVar("TaskType", bound=Hashable)
@@ -162,6 +163,7 @@ def processes(count: int | None) -> NewExecutor:
 
     They leave an interrupt of the terminal to the one that has begun them.
     """
+    keep_working_folder_out_of_workers()
     return partial(
         ProcessPoolExecutor,
         count or os.cpu_count() or 1,

@@ -4,7 +4,6 @@ import grp
 import os
 import shutil
 import subprocess
-import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from pathlib import Path
 from hexacell.cell.loader import Cell
 from hexacell.cell.operation import DAY_MINUTES
 from hexacell.errors import FileError, UsageError
+from hexacell.python_process import python_command
 from hexacell.services.unattended.scheduled_run import (
     ScheduledRun,
     cell_of,
@@ -73,7 +73,7 @@ def scheduled_run(cell: Cell, daily: str, mode: str, metrics: Path | None) -> Sc
     run = ScheduledRun(
         cell=path,
         name=cell.settings.name,
-        program=(sys.executable, "-m", "hexacell"),
+        program=python_command("hexacell"),
         mode=mode,
         hour=hour,
         minute=minute,

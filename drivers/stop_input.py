@@ -12,7 +12,7 @@ from pathlib import Path
 import serial
 
 from drivers.interfaces import DeviceIdentity
-from drivers.serial.opening import close_port, opening_errors
+from drivers.serial.opening import close_port, opening_errors, unopened_port
 from hexacell.cell.measuring import GuardSettings
 from hexacell.errors import HexacellError
 
@@ -45,7 +45,7 @@ class CombinedStopInput:
             return None
         try:
             with opening_errors(SUBJECT, self._url):
-                self._port = serial.serial_for_url(self._url, do_not_open=True)
+                self._port = unopened_port(self._url)
                 self._port.dtr = self._port.rts = True
                 self._port.open()
                 getattr(self._port, self._line)

@@ -13,6 +13,7 @@ import canopen
 
 from drivers.errors import BusError
 from drivers.wire_trace import LineRecord, TraceRecorder, TrafficDirection
+from hexacell.addresses import require_serial_port
 from hexacell.clock import Patience
 
 SLICE_S = 0.03
@@ -115,6 +116,7 @@ class EncoderBus:
 
     def _connect(self, settings: Mapping[str, Any]) -> can.BusABC:
         try:
+            require_serial_port(str(settings.get("channel", "")))  # of an adapter with slcan
             return can.Bus(**settings)
         except Exception as error:  # the interfaces of python-can raise errors of any class
             action = "Plug the CAN adapter in, or correct `bus` under [encoders] in the cell file"

@@ -19,7 +19,8 @@ from serial.tools import list_ports
 from serial.tools.list_ports_common import ListPortInfo
 
 from drivers.errors import PortLost
-from hexacell.errors import FileError
+from hexacell.addresses import require_serial_port
+from hexacell.errors import FileError, UsageError
 
 SLICE_S = 0.05
 """Longest wait, s, without a look whether the port is to be closed."""
@@ -42,6 +43,16 @@ _CAUSES = {
 }
 
 
+def unopened_port(url: str, **settings: Any) -> serial.Serial:  # noqa: ANN401 - pyserial's
+    """What pyserial has for a device path or for a URL that may be named; raises what it does.
+
+    Raises:
+        UsageError: pyserial might do something else than open a port there, such as write a file.
+    """
+    require_serial_port(url)
+    return serial.serial_for_url(url, do_not_open=True, **settings)
+
+
 def opened_port(
     url: str,
     settings: Mapping[str, object],
@@ -59,7 +70,7 @@ def opened_port(
     with opening_errors(subject, url):
         lines = {name: level for name, level in settings.items() if name in {"dtr", "rts"}}
         line_settings: Any = {name: value for name, value in settings.items() if name not in lines}
-        port = serial.serial_for_url(url, do_not_open=True, **line_settings)
+        port = unopened_port(url, **line_settings)
         port.timeout = SLICE_S  # set once and before opening: a pseudo-terminal refuses later changes
         if not url.lower().startswith(WITHOUT_WRITE_TIMEOUT):
             port.write_timeout = WRITE_SLICE_S
@@ -119,6 +130,8 @@ def opening_errors(subject: str, url: str) -> Iterator[None]:
     """
     try:
         yield
+    except UsageError as error:
+        raise FileError(error.problem, subject=subject, action=error.action) from error
     except (ValueError, TypeError) as error:
         raise FileError(
             f"port {url} or its serial settings are refused: {error}",

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from hexacell.cell.fields import NotNegative, Positive, Section, Six, Text, broken_rule, key
+from hexacell.cell.fields import NotNegative, Positive, Section, SerialPortName, Six, Text, broken_rule, key
 
 NUMBER = re.compile(  # a number as instruments send it
     r"[+-]?\d+(\.\d*)?"
@@ -152,7 +152,7 @@ class LatchSettings(Section):
 class ModbusEncoderSettings(RegisterSettings):
     """Where the positions of encoders of protocol ``modbus`` are; they are counts."""
 
-    port: Text | None = key(None, "device path or pyserial URL of the line with all of them")
+    port: SerialPortName | None = key(None, "device path or pyserial URL of the line with all of them")
     serial: dict[str, Any] = key({}, "settings for pyserial; by default 19200 baud and even parity")
     devices: Six[ModbusAddress] = key(
         (1, 1, 1, 1, 1, 1), "addresses of the devices with legs 1 to 6; one device may have several legs"

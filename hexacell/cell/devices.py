@@ -6,6 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from hexacell.addresses import require_serial_port
 from hexacell.cell.described_devices import (
     DbcSettings,
     ModbusEncoderSettings,
@@ -21,9 +22,11 @@ from hexacell.cell.fields import (
     NotNegative,
     Positive,
     Section,
+    SerialPortName,
     Six,
     SixInRange,
     Text,
+    accepted,
     broken_rule,
     key,
 )
@@ -72,7 +75,9 @@ class GaugeSettings(Section):
         "protocol of the gauge: sylvac, mux10, cdi and others of docs/drivers.md, or one that a plug-in "
         "adds",
     )
-    port: Text | None = key(None, "device path, pyserial URL or VISA resource; gauges may share one")
+    port: SerialPortName | None = key(
+        None, "device path, pyserial URL or VISA resource; gauges may share one"
+    )
     serial: dict[str, Any] = key({}, "settings for pyserial in place of the protocol's defaults")
     channel: int = key(1, "input of a multiplexer, from 1; the four digits of a U-WAVE", ge=0, le=9999)
     timeout_s: Positive = key(0.5, "longest wait for an answer, s")
@@ -175,6 +180,12 @@ class EncoderSettings(Section, ABC):
         if len(set(nodes)) != len(nodes):
             raise broken_rule("two encoders have the same node id", "Give each leg its own node id")
         return nodes
+
+    @field_validator("bus")
+    @classmethod
+    def _has_a_channel_that_may_be_opened(cls, bus: dict[str, Any] | None) -> dict[str, Any] | None:
+        accepted(str((bus or {}).get("channel", "")), require_serial_port)
+        return bus
 
     @property
     def are_of_controller(self) -> bool:

@@ -1,6 +1,8 @@
 """Types that the sections of the cell file share, with each other and with the records of a run."""
 
+from collections.abc import Callable
 from datetime import date, datetime
+from functools import partial
 from typing import Annotated, Any, TypeVar
 
 from pydantic import (
@@ -16,6 +18,8 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
+from hexacell.addresses import require_host, require_serial_port
+from hexacell.errors import UsageError
 from hexacell.storage.toml_document import MASK
 
 LARGEST_NUMBER = 1e6
@@ -70,6 +74,15 @@ def _printable(text: str) -> str:
     return text
 
 
+def accepted(text: str, require: Callable[[str], object]) -> str:
+    """A text, if ``require`` raises no ``UsageError`` for it; else the same as a broken rule."""
+    try:
+        require(text)
+    except UsageError as error:
+        raise broken_rule(error.problem, error.action or "Correct it") from error
+    return text
+
+
 def _a_password(secret: SecretStr) -> SecretStr:
     password = secret.get_secret_value()
     if len(password) > LONGEST_TEXT or not password.isprintable():
@@ -121,6 +134,8 @@ NotNegative = Annotated[
     AfterValidator(_not_negative),
 ]
 Text = Annotated[str, Field(max_length=LONGEST_TEXT), AfterValidator(_printable)]
+Host = Annotated[Text, AfterValidator(partial(accepted, require=require_host))]
+SerialPortName = Annotated[Text, AfterValidator(partial(accepted, require=require_serial_port))]
 Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME), AfterValidator(_a_name)]
 Password = Annotated[
     SecretStr, AfterValidator(_a_password), PlainSerializer(lambda _: MASK, return_type=str)

@@ -10,6 +10,7 @@ from hexacell.cell.fields import (
     Positive,
     Section,
     Seed,
+    SerialPortName,
     Six,
     SixInRange,
     Text,
@@ -247,7 +248,9 @@ class GuardSettings(Section):
     """When motion is stopped; more limits are in [limits] and [acceptance]."""
 
     stop_file: Text | None = key(None, "file whose existence forbids motion, relative to the cell file")
-    stop_port: Text | None = key(None, "serial port of a stop contact, closed while motion is allowed")
+    stop_port: SerialPortName | None = key(
+        None, "serial port of a stop contact, closed while motion is allowed"
+    )
     stop_contact: Literal["dsr", "cts"] = key(
         "dsr", "lines of stop_port that the contact joins: dsr, DTR and DSR; cts, RTS and CTS"
     )

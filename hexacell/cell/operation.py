@@ -8,7 +8,9 @@ from typing import Literal
 
 from pydantic import field_validator, model_validator
 
-from hexacell.cell.fields import Name, NotNegative, Positive, Section, Text, broken_rule, key
+from hexacell.addresses import address_of, is_link_local
+from hexacell.cell.fields import Host, Name, NotNegative, Positive, Section, Text, broken_rule, key
+from hexacell.errors import UsageError
 from hexacell.storage.toml_document import MASK
 
 _POSTGRESQL = re.compile(r"postgresql://(?P<login>[^/@]*@)?[^/@]*/[^/?]+(?P<query>\?.*)?")
@@ -39,13 +41,17 @@ def mistake_in_url(url: str) -> tuple[str, str] | None:
         return "this is no address of a PostgreSQL database", "Write postgresql://user@host/database"
     if ":" in (found["login"] or "") or "password" in (found["query"] or ""):
         return "a password does not belong here", "Put it into ~/.pgpass, and remove it"
+    try:
+        address_of(url)
+    except UsageError as error:
+        return error.problem, "Write postgresql://user@host/database"
     return None
 
 
 class OpcUaSettings(Section):
     """The server that ``hexacell serve`` starts; its messages are always signed and encrypted."""
 
-    host: Text = key("127.0.0.1", "address that the server listens at", min_length=1)
+    host: Host = key("127.0.0.1", "address that the server listens at")
     port: int = key(4840, "TCP port that the server listens at", ge=1, le=65535)
     folder: Text = key(
         "opcua",
@@ -150,8 +156,21 @@ BROKERS = ("mqtt", "mqtts")
 WITHOUT_TOKENS = (*WEBHOOKS, *BROKERS, "mailto", "mailtos", "json", "jsons")
 """Addresses that may stand in a cell file; those of chat services have a token in them."""
 
-_ADDRESS = re.compile(r"(?P<scheme>[a-z][a-z0-9+.-]*)://(?P<login>[^/?#@]*@)?[^/?#@]+[^#]*")
+CHAT_SERVERS = ("gotify", "matrix", "mmost", "nctalk", "ntfy", "rocket", "signal", "synology", "xmpp")
+"""Chat that a company may have a server of its own for; with an s where it is encrypted."""
+
+CHAT_SERVICES = (
+    *("discord", "feishu", "gchat", "ifttt", "lark", "line", "mailgun", "msteams", "o365", "opsgenie"),
+    *("pagerduty", "pbul", "pover", "prowl", "sendgrid", "ses", "signl4", "slack", "sns", "tgram"),
+    *("threema", "twilio", "vonage", "webex", "whatsapp", "workflow", "workflows", "wxteams", "zulip"),
+)
+"""Chat, mail and calls at fixed hosts; what stands in place of a host is a name or a token."""
+
+TOLD_BY = {*WITHOUT_TOKENS, *CHAT_SERVERS, *(f"{name}s" for name in CHAT_SERVERS), *CHAT_SERVICES}
+"""All that notices are sent by: what acts on this computer or has its files read is not among them."""
+
 _SECRET_QUERY = re.compile(r"[?&][^=&]*(?:pass|token|secret|key|auth)[^=&]*=", re.IGNORECASE)
+LINK_LOCAL = "the address is link-local, or tells the secrets of a cloud"
 _WILD = re.compile(r"[#+\0]")
 
 
@@ -185,6 +204,11 @@ class NotificationSettings(Section):
         "environment take precedence",
         min_length=1,
     )
+    link_local: bool = key(
+        False,
+        "whether url may lead to a link-local address (169.254.0.0/16, fe80::/10) or to the secrets that a "
+        "cloud tells its computers",
+    )
 
     @field_validator("url")
     @classmethod
@@ -209,6 +233,13 @@ class NotificationSettings(Section):
         return topic
 
     @model_validator(mode="after")
+    def _leads_elsewhere(self) -> NotificationSettings:
+        hosts = () if self.url is None or self.link_local else hosts_of(self.url)
+        if any(is_link_local(host, by_name=False) for host in hosts):
+            raise broken_rule(LINK_LOCAL, "Correct it, or write link_local = true beside url on purpose")
+        return self
+
+    @model_validator(mode="after")
     def _of_a_broker(self) -> NotificationSettings:
         if self.topic is not None and self.url is not None and scheme_of(self.url) not in BROKERS:
             raise broken_rule("only MQTT has topics", "Remove topic, or write mqtts://host as the url")
@@ -222,15 +253,38 @@ def scheme_of(url: str) -> str:
 
 def mistake_in_address(url: str) -> tuple[str, str] | None:
     """What is wrong with an address in a cell file, and what to do; None if nothing is."""
-    found = _ADDRESS.fullmatch(url)
-    if found is None:
-        return "this is no address", "Write https://host/path, mqtts://host or mailto://host?to=..."
-    login = found["login"] or ""
-    if (":" in login and not login.endswith(f":{MASK}@")) or _SECRET_QUERY.search(url):
-        return "a password does not belong here", "Move it to a file of mode 600, and name it password_file"
-    if found["scheme"] not in WITHOUT_TOKENS:
+    scheme, write = scheme_of(url), "Write https://host/path, mqtts://host or mailto://host?to=..."
+    if "://" in url and scheme not in WITHOUT_TOKENS:
         return (
-            f"an address of {found['scheme']} may have a token in it",
+            f"an address of {scheme} may have a token in it",
             "Move url to a file of mode 600, and name it password_file",
         )
+    try:
+        found = address_of(url)
+    except UsageError as error:
+        return error.problem, write
+    if not found.host or "#" in url:
+        return "this is no address", write
+    password = found.login.partition(":")[2]
+    if (password and password.partition("@")[0] != MASK) or _SECRET_QUERY.search(url):
+        return "a password does not belong here", "Move it to a file of mode 600, and name it password_file"
     return None
+
+
+def require_sendable(url: str) -> None:
+    """Refuse an address, wherever it is from, by which no notices are sent.
+
+    Raises:
+        UsageError: nothing is sent by its scheme, or it is no address.
+    """
+    if scheme_of(url) not in TOLD_BY:
+        raise UsageError(
+            "notices are not sent by this kind of address",
+            action="Write one that docs/howto-integrations.md names",
+        )
+    hosts_of(url)
+
+
+def hosts_of(url: str) -> tuple[str, ...]:
+    """The hosts that an address names; none for a service at a fixed host. Raises ``UsageError``."""
+    return () if scheme_of(url) in CHAT_SERVICES else address_of(url).hosts

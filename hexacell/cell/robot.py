@@ -12,6 +12,7 @@ from pydantic import SecretStr, model_validator
 from hexacell.cell.fields import (
     Direction,
     GeometrySettings,
+    Host,
     InRange,
     Password,
     PointInRange,
@@ -121,7 +122,7 @@ class ControllerSettings(Section):
     protocol: Text = key(
         "linuxcncrsh", "protocol of the controller: linuxcncrsh, or one that a plug-in adds"
     )
-    host: Text = key("127.0.0.1", "network name or address of the controller")
+    host: Host = key("127.0.0.1", "network name or address of the controller")
     port: int | None = key(None, "TCP port of the controller", ge=1, le=65535)
     connect_password: Password = key(
         SecretStr("EMC"), "password that linuxcncrsh gets on connecting; better in password_file"

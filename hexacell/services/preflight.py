@@ -8,10 +8,10 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 import numpy as np
 
+from hexacell.addresses import address_of
 from hexacell.cell.limits import NEAR_DEG, NEAR_MM
 from hexacell.cell.loader import Cell, checked_cell
 from hexacell.cell.operation import scheme_of
@@ -123,8 +123,8 @@ def telling_warnings(cell: Cell) -> Iterator[str]:
     for one in cell.settings.notifications:
         if one.url is None or one.password_file is None:
             continue
-        host, scheme = urlsplit(one.url).hostname, scheme_of(one.url)
-        if host is not None and scheme in IN_CLEAR and not is_loopback(host):
+        host, scheme = address_of(one.url).host, scheme_of(one.url)
+        if host and scheme in IN_CLEAR and not is_loopback(host):
             yield (
                 f"notification {one.name}: its password goes over the network in clear. Write {scheme}s:// "
                 f"instead of {scheme}://"

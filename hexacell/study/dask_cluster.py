@@ -6,7 +6,6 @@ when the scheduler itself is lost, breaks the executor, and the study does it ag
 
 import asyncio
 import logging
-import re
 from collections.abc import Callable, Coroutine
 from concurrent.futures import BrokenExecutor, Executor, Future
 from concurrent.futures import wait as wait_for
@@ -21,6 +20,7 @@ from distributed.client import FutureCancelledError
 from distributed.scheduler import KilledWorker
 
 from hexacell import __version__
+from hexacell.addresses import address_of
 from hexacell.errors import ExitCode, HexacellError, UsageError
 from hexacell.study.tasks import NewExecutor
 
@@ -51,7 +51,8 @@ def dask_cluster(address: str, *, patience_s: float = PATIENCE_S) -> NewExecutor
     Raises:
         UsageError: this is not an address of a scheduler.
     """
-    if not re.fullmatch(r"(tcp|tls)://\S+:\d+", address):
+    scheduler = address_of(address)
+    if scheduler.scheme not in {"tcp", "tls"} or not scheduler.host or scheduler.port is None:
         raise UsageError(f"'{address}' is not an address of a Dask scheduler", action="Try tcp://HOST:8786")
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # the errors here say it in plain words

@@ -20,10 +20,20 @@ from http.client import HTTPException
 from pathlib import Path
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
-from urllib.parse import quote, unquote, urlsplit
+from urllib.parse import quote, unquote
 
+from hexacell.addresses import address_of, is_link_local
 from hexacell.cell.fields import Password, Section
-from hexacell.cell.operation import BROKERS, WEBHOOKS, NotificationSettings, Occasion, scheme_of
+from hexacell.cell.operation import (
+    BROKERS,
+    LINK_LOCAL,
+    WEBHOOKS,
+    NotificationSettings,
+    Occasion,
+    hosts_of,
+    require_sendable,
+    scheme_of,
+)
 from hexacell.cell.passwords import stated_secrets
 from hexacell.errors import UsageError
 from hexacell.services.unattended.notice import Notice, NoticeUndelivered
@@ -56,6 +66,7 @@ class NoticeAddress:
     topic: str = ""
     ca_file: Path | None = None
     open_url: str | None = None
+    link_local: bool = False
 
     def masked(self, text: str) -> str:
         """A text without anything of this address that is secret."""
@@ -66,10 +77,11 @@ class NoticeAddress:
     def _secrets(self) -> set[str]:
         given = [self.user, self.password, self.token]
         if self.open_url != self.url:
-            parts = urlsplit(self.url)
-            given += [self.url, parts.username, parts.password, parts.query, parts.fragment]
-            given += re.split(r"[/&=?;#]", f"{parts.path}&{parts.query}&{parts.fragment}")
-            given += [parts.netloc]
+            rest = self.url.partition("://")[2]
+            netloc = re.split("[/?#]", rest)[0]
+            user, _, password = netloc.rpartition("@")[0].partition(":")
+            given += [self.url, netloc, user, password, *re.split("[?#]", rest)[1:]]
+            given += re.split(r"[/&=?;#]", rest)
         whole = {one for one in given if one and len(one) >= _SHORTEST_SECRET}
         return whole | {unquote(one) for one in whole} | {quote(one, safe="") for one in whole}
 
@@ -85,7 +97,7 @@ def resolved_address(
     """The address of a recipient; ``folder`` has the cell file, ``cell`` is the cell's name.
 
     Raises ``FileError`` if its password file cannot be read, or others can read or change it;
-    ``UsageError`` if there is no url anywhere, or a variable cannot be one.
+    ``UsageError`` if there is no url anywhere, or it or a variable cannot be one.
     """
     file = None if settings.password_file is None else folder / settings.password_file
     variables = {part: variable(settings.name, part) for part in PARTS}
@@ -100,9 +112,19 @@ def resolved_address(
             f"{variable(settings.name, 'url')}",
         )
     ca_file = None if settings.ca_file is None else folder / settings.ca_file
+    try:
+        require_sendable(url)
+    except UsageError as error:
+        raise UsageError(error.problem, subject=settings.name, action=error.action) from error
     topic = settings.topic or f"hexacell/{re.sub(r'[#+/]', '-', cell)}"
     return NoticeAddress(
-        settings.name, url, topic=topic.rstrip("/"), ca_file=ca_file, open_url=settings.url, **found
+        settings.name,
+        url,
+        topic=topic.rstrip("/"),
+        ca_file=ca_file,
+        open_url=settings.url,
+        link_local=settings.link_local,
+        **found,
     )
 
 
@@ -151,6 +173,7 @@ def _attempt(address: NoticeAddress, notice: Notice, longest_s: float) -> None:
                 send = post_to_webhook
             elif scheme in BROKERS:
                 send = publish_by_mqtt
+            _require_elsewhere(address)
             send(address, notice, min(TIMEOUT_S, longest_s))
         except NoticeUndelivered as error:
             ended.put(str(error))
@@ -167,6 +190,13 @@ def _attempt(address: NoticeAddress, notice: Notice, longest_s: float) -> None:
     problem = ended.get_nowait()
     if problem is not None:
         raise NoticeUndelivered(problem)
+
+
+def _require_elsewhere(address: NoticeAddress) -> None:
+    """Refuse a host that is, or resolves to, a link-local address, unless that is on purpose."""
+    hosts = () if address.link_local else hosts_of(address.url)
+    if any(is_link_local(host, by_name=True) for host in hosts):
+        raise NoticeUndelivered(LINK_LOCAL)
 
 
 def post_to_webhook(address: NoticeAddress, notice: Notice, timeout_s: float) -> None:
@@ -231,10 +261,10 @@ def publish_by_mqtt(address: NoticeAddress, notice: Notice, timeout_s: float) ->
         NoticeUndelivered: the broker did not acknowledge it, or paho-mqtt is not installed.
     """
     client, answered, answer = _client(address, timeout_s)
-    url = urlsplit(address.url)
+    url = address_of(address.url)
     is_test = Occasion.TEST in notice.occasions
     try:
-        client.connect(url.hostname or "", url.port or PORTS[url.scheme])
+        client.connect(url.host, url.port or PORTS[url.scheme])
         client.loop_start()
         if not answered.wait(timeout_s):
             raise NoticeUndelivered("the broker does not answer")
@@ -272,7 +302,7 @@ def _client(address: NoticeAddress, timeout_s: float) -> tuple[Client, threading
     client.on_connect = heard
     if address.user is not None:
         client.username_pw_set(address.user, address.password)
-    if urlsplit(address.url).scheme == "mqtts":
+    if scheme_of(address.url) == "mqtts":
         try:
             client.tls_set_context(ssl.create_default_context(cafile=address.ca_file))
         except OSError as error:

@@ -3,21 +3,24 @@
 import errno
 import os
 import termios
+import threading
 from unittest.mock import Mock
 
 import pytest
 import serial
 
-from drivers.errors import PortLost
+from drivers.encoders.can_bus import EncoderBus
+from drivers.errors import BusError, PortLost
 from drivers.serial.opening import opening_errors
+from drivers.stop_input import CombinedStopInput
 from hexacell.errors import DeviceError, ExitCode, FileError
 from tests.drivers.serial.shared_port.conftest import LONG_S, FakePort, link_to, opened
 
 
 async def test_settings_reach_pyserial_unchanged(fake):
     port = fake(FakePort())
-    await opened("any://url?x=1", baudrate=4800, parity="E", xonxoff=True, timeout=99, rts=False)
-    assert port.url == "any://url?x=1"
+    await opened("socket://url:1?x=1", baudrate=4800, parity="E", xonxoff=True, timeout=99, rts=False)
+    assert port.url == "socket://url:1?x=1"
     assert port.settings == {"baudrate": 4800, "parity": "E", "xonxoff": True, "timeout": 99}
     assert port.rts is False
     assert port.timeout <= 0.2
@@ -42,6 +45,19 @@ async def test_settings_that_pyserial_refuses_are_errors_of_the_cell_file(links,
     with pytest.raises(FileError, match="are refused") as caught:
         await links.acquire(url, "x", settings).open()
     assert caught.value.exit_code is ExitCode.USAGE
+
+
+@pytest.mark.parametrize("scheme", ["spy", "SPY", "alt", "hwgrep", "cp2110", "unknown"])
+async def test_a_url_by_which_pyserial_does_more_than_open_a_port_is_refused(links, tmp_path, scheme):
+    (tmp_path / "cell.toml").write_text("kept")
+    url = f"{scheme}:///dev/null?file={tmp_path / 'cell.toml'}"
+    with pytest.raises(FileError, match="are refused"):
+        await links.acquire(url, "x", {}).open()
+    with pytest.raises(FileError, match="are refused"):
+        await CombinedStopInput(url=url).open()
+    with pytest.raises(BusError, match="are refused"):
+        EncoderBus({"interface": "slcan", "channel": url}, threading.Event())
+    assert (tmp_path / "cell.toml").read_text() == "kept"
 
 
 async def test_gauges_on_one_port_share_it_until_the_last_releases_it(links, fake):

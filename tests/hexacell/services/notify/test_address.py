@@ -1,5 +1,6 @@
 """Where the secrets of an address come from, and that none is shown."""
 
+import socket
 from pathlib import Path
 from typing import Any
 
@@ -7,7 +8,9 @@ import pytest
 
 from hexacell.cell.operation import NotificationSettings
 from hexacell.errors import FileError, UsageError
-from hexacell.services.unattended.delivery import NoticeAddress, resolved_address, variable
+from hexacell.services.unattended.delivery import NoticeAddress, deliver, resolved_address, variable
+from hexacell.services.unattended.notice import NoticeUndelivered
+from tests.hexacell.services.notify.notices import a_notice, an_address
 
 CHAT = "slack://hidden-a/hidden-b/hidden-c/#general?footer=hidden-d"
 
@@ -68,3 +71,27 @@ def test_no_part_of_a_secret_is_shown(tmp_path) -> None:
     said = f"could not reach {CHAT}: hidden-b was refused; and hidden-d too"
     assert "hidden" not in found.masked(said)
     assert "was refused" in found.masked(said)
+
+
+@pytest.mark.parametrize(
+    "url", ["syslog://localhost", "dbus://hidden", "http://[::hidden/", "http://h:hidden/"]
+)
+def test_an_address_by_which_nothing_is_sent_is_refused_and_not_shown(tmp_path, url) -> None:
+    with pytest.raises(UsageError, match="night shift") as raised:
+        resolve(tmp_path, {"HEXACELL_NOTIFY_NIGHT_SHIFT_URL": url})
+    assert "hidden" not in str(raised.value)
+
+
+@pytest.mark.parametrize("url", ["tgram://123456789:hidden_token/1", "slack://a/b/c", "ntfys://topic"])
+def test_chat_is_accepted_from_there(tmp_path, url) -> None:
+    assert resolve(tmp_path, {"HEXACELL_NOTIFY_NIGHT_SHIFT_URL": url}).url == url
+
+
+@pytest.mark.parametrize("scheme", ["http", "mqtt", "json", "gotify"])
+def test_a_name_that_resolves_to_a_link_local_address_gets_nothing(monkeypatch, scheme) -> None:
+    found = [(socket.AF_INET, socket.SOCK_STREAM, 6, "", ("169.254.169.254", 0))]
+    monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: found)
+    monkeypatch.setattr(socket, "create_connection", None)
+    monkeypatch.setattr(socket.socket, "connect", None)
+    with pytest.raises(NoticeUndelivered, match="link-local"):
+        deliver(an_address(f"{scheme}://robots.example/x"), a_notice(), pause=lambda _: None)

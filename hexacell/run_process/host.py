@@ -19,7 +19,7 @@ from procedures.devices.device_set import Devices
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Abort, CommandQueue, Pause, Stop
 from procedures.engine.engine import Engine
-from procedures.journal.journal import now, read_entries
+from procedures.journal.journal import is_evidence_lost, now, read_entries
 from procedures.run.questions import Question
 from procedures.run.state import RunState
 from procedures.steps import events
@@ -207,5 +207,8 @@ class RunHost:
 def failure_message(error: HexacellError) -> messages.HostFailed:
     """An error that ends a run, as a message."""
     return messages.HostFailed(
-        problem=error.cause, action=error.action or "", exit_code=int(error.exit_code)
+        problem=error.cause,
+        action=error.action or "",
+        exit_code=int(error.exit_code),
+        evidence_lost=is_evidence_lost(error),
     )

@@ -160,13 +160,14 @@ class CursorMoved(Frozen):
 class HostFailed(Frozen):
     """The run could not begin or ended early, or a message was refused: why, and what to do next.
 
-    ``exit_code`` is that of the run; None where it goes on.
+    ``exit_code`` is that of the run; None where it goes on. With ``evidence_lost`` it cannot be resumed.
     """
 
     kind: Literal["failed"] = "failed"
     problem: str
     action: str = ""
     exit_code: int | None = None
+    evidence_lost: bool = False
 
 
 class GiveCommand(Frozen):

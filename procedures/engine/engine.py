@@ -2,15 +2,14 @@
 
 import asyncio
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 
 from hexacell.cell.recovery import Escalations
-from hexacell.errors import ExitCode, HexacellError, Interruption, OutOfTime
+from hexacell.errors import ExitCode, HexacellError, Interruption, OutOfTime, SeveralErrors
 from hexacell.verdict.decision import Verdict
 from procedures.engine.command_loop import CommandLoop, Status, StepCancelled
 from procedures.engine.commands import Command, CommandQueue, QuestionBroker, UnattendedOperator
 from procedures.engine.recovery import GIVE_UP, Recovery, Reversal, revert_at_end, revert_unrecorded
-from procedures.journal.journal import Journal
+from procedures.journal.journal import EvidenceLost, Journal, is_evidence_lost
 from procedures.run.cancellation import shielded
 from procedures.run.keys import Phase
 from procedures.run.state import RunState, apply, fold
@@ -74,6 +73,7 @@ class Engine:
 
         Raises:
             Interruption: a command ended the run early.
+            EvidenceLost: its journal is no longer what it wrote.
             OutOfTime: it was to end, and the robot is back at a reference.
             WriteBackUndone: a written geometry could not be verified; the config is as before.
             RobotNotStopped: it ended early, and the robot could not be stopped.
@@ -147,7 +147,7 @@ class Engine:
             await self._record_outcome(await self.commands.run_cancellable(executing))
         except StepCancelled:
             pass
-        except OutOfTime:
+        except (OutOfTime, EvidenceLost):
             raise
         except HexacellError as error:
             await self._recovery.recover(error, step, self.state)
@@ -190,8 +190,10 @@ class Engine:
             code = ExitCode.FAULT if isinstance(raised, Exception) else ExitCode.INTERRUPTED
             code = raised.exit_code if isinstance(raised, HexacellError) else code
             reason = str(raised) or type(raised).__name__
-            self._record_if_possible(events.Interrupted(reason=reason, exit_code=int(code)))
-        return raised
+            lost = self._record_if_possible(events.Interrupted(reason=reason, exit_code=int(code)))
+        if lost is None or not isinstance(raised, HexacellError) or is_evidence_lost(error):
+            return raised
+        return raised if may_still_move(raised) else SeveralErrors("the run ended early", [raised, lost])
 
     async def _revert(self, reversal: Reversal, cause: BaseException) -> BaseException:
         """Revert a change of the config, whatever is cancelled meanwhile; gives the error to report."""
@@ -206,9 +208,15 @@ class Engine:
             return reversal.failed(cause, error)
         return reversal.undone(cause)
 
-    def _record_if_possible(self, event: events.Event) -> None:
-        with suppress(HexacellError):
+    def _record_if_possible(self, event: events.Event) -> EvidenceLost | None:
+        """Record an event; that the journal is lost, if it is."""
+        try:
             self.record(event)
+        except EvidenceLost as lost:
+            return lost
+        except HexacellError:
+            pass
+        return None
 
     async def _pause(self, *, at_once: bool) -> None:
         if at_once:

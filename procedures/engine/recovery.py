@@ -23,6 +23,7 @@ from procedures.devices.reconnection import reconnect
 from procedures.devices.settling import NeverSettled
 from procedures.engine.command_loop import CommandLoop, StepCancelled
 from procedures.engine.commands import QuestionBroker
+from procedures.journal.journal import is_evidence_lost
 from procedures.run.keys import SetKey
 from procedures.run.questions import ask_recovery
 from procedures.run.state import RunState
@@ -209,12 +210,13 @@ class Reversal:
 
     def undone(self, error: BaseException) -> BaseException:
         """The error to report once it is reverted: of a written result, that it was undone, and why."""
-        is_result = isinstance(self.step, RollBack) and self.is_recorded
+        is_result = isinstance(self.step, RollBack) and (self.is_recorded or is_evidence_lost(error))
         if not is_result or not isinstance(error, HexacellError) or may_still_move(error):
             return error
-        return WriteBackUndone(
-            f"the new geometry was written and could not be verified; the old config is back. {error}"
-        )
+        undone = "the new geometry was written and could not be verified; the old config is back."
+        if is_evidence_lost(error):  # no journal says so: it can be resumed by none
+            return WriteBackUndone(f"{undone} {error.cause}", action="Begin a new run")
+        return WriteBackUndone(f"{undone} {error}")
 
     def failed(self, cause: BaseException, error: HexacellError) -> BaseException:
         """The error to report if it cannot be reverted: the cause, and why, unless a resumption may."""
@@ -238,12 +240,15 @@ def revert_at_end(state: RunState, error: BaseException) -> Reversal | None:
 
     A result that was not verified is reverted after a failure; a person who interrupts may resume and
     verify it. A provisional geometry is reverted where the robot is at a reference. At other poses the
-    joint variables may belong to no pose of the old geometry; the resumed run reverts it.
+    joint variables may belong to no pose of the old geometry; the resumed run reverts it. Where the journal
+    itself is lost, nothing can be recorded in it.
     """
+    is_recorded = not is_evidence_lost(error)
     is_failure = isinstance(error, HexacellError) and not isinstance(error, Interruption)
     if is_failure and state.is_unverified:
-        return Reversal(RollBack(), "the new geometry was not verified, and could not be taken back")
+        failure = "the new geometry was not verified, and could not be taken back"
+        return Reversal(RollBack(), failure, is_recorded)
     is_at_reference = state.at_pose is not None and state.at_pose[1] == 1
     if state.config_write_pending or (state.provisional_active and is_at_reference):
-        return Reversal(TakeBack(), "")
+        return Reversal(TakeBack(), "", is_recorded)
     return None

@@ -7,11 +7,13 @@ feed. The checksum is CRC-32 over the line's own bytes as they would be without 
 Every line is on the disk before the next is begun, so a power cut can tear the last one only: it may
 be cut off, or have zeros where its bytes should be. Such a tail is dropped: its write was never
 confirmed. Anything else that is wrong is damage and refused with its line. One process writes
-at a time.
+at a time. What a run has decided rests on what it wrote; whether that is still there, in the file of that
+name, is looked at before each further line, and once more before the controller's config is changed.
 """
 
 import fcntl
 import gc
+import hashlib
 import logging
 import os
 import re
@@ -28,7 +30,7 @@ from typing import BinaryIO
 from pydantic import TypeAdapter, ValidationError
 
 from hexacell.cell.fields import first_mistake
-from hexacell.errors import CellBusy, FileError
+from hexacell.errors import CellBusy, FileError, HexacellError, flatten_errors
 from hexacell.storage import atomic_files
 from procedures.steps.events import Event
 
@@ -39,6 +41,8 @@ LONGEST_LINE = 16 << 20
 
 # A link would lead what is appended to another file.
 _APPENDING = os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NONBLOCK | os.O_NOFOLLOW
+
+_PART = 1 << 20
 
 VERSION = 1
 """What this program writes and reads. A new version is one in which something no longer means the same."""
@@ -92,6 +96,17 @@ def read_entries(path: Path, longest_line: int = LONGEST_LINE) -> tuple[Entry, .
         return _parse(path, stream, longest_line)[0]
 
 
+class EvidenceLost(FileError):
+    """The journal of a run is no longer what the run wrote: nothing may be done that rests on it."""
+
+
+def is_evidence_lost(error: BaseException) -> bool:
+    """Whether an error says, alone or among others, that the evidence of a run is lost."""
+    causes = (error, error.__cause__)
+    found = [one for cause in causes if isinstance(cause, HexacellError) for one in flatten_errors(cause)]
+    return any(isinstance(one, EvidenceLost) for one in found)
+
+
 class Journal(AbstractContextManager["Journal"]):
     """A journal open for appending; raises ``CellBusy`` if another process writes it, or ``FileError``."""
 
@@ -104,6 +119,7 @@ class Journal(AbstractContextManager["Journal"]):
         try:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             self._events, self._whole = self._read()
+            self._digest, self._times = self._digest_of_file(), self._times_of_file()
         except BlockingIOError:
             os.close(self._descriptor)
             raise CellBusy("another process writes this journal", subject=path) from None
@@ -121,7 +137,13 @@ class Journal(AbstractContextManager["Journal"]):
         return tuple(self._events)
 
     def append(self, event: Event) -> None:
-        """Add one event and sync it to the disk; after a ``FileError`` the journal is as before."""
+        """Add one event and sync it to the disk; after a ``FileError`` the journal is as before.
+
+        Raises:
+            EvidenceLost: what was written before is not there any more; nothing is added.
+            FileError: it cannot be written.
+        """
+        self.require_intact()
         line = self._line(event)
         try:
             if self._is_torn:
@@ -138,7 +160,60 @@ class Journal(AbstractContextManager["Journal"]):
             ) from error
         self._events.append(event)
         self._whole += len(line)
+        self._digest.update(line)
+        self._times = self._times_of_file()
         _log.info("line %d of %s: %s", len(self._events), self.path, event.kind)
+
+    def require_intact(self) -> None:
+        """Make sure that the file of this name is the one that is written, and holds what was written.
+
+        It is read again only where something has touched it since it was written last.
+
+        Raises:
+            EvidenceLost: it was deleted, replaced, cut short, continued or changed.
+        """
+        try:
+            named, held = os.lstat(self.path), os.fstat(self._descriptor)
+        except OSError as error:
+            why = "is gone" if isinstance(error, FileNotFoundError) else f"cannot be seen: {error.strerror}"
+            raise self._lost(why) from error
+        if not os.path.samestat(named, held):
+            raise self._lost("was replaced by another file")
+        if held.st_size < self._whole:
+            raise self._lost("was cut short")
+        if held.st_size > self._whole and not self._is_torn:
+            raise self._lost("was written by somebody else")
+        if (held.st_mtime_ns, held.st_ctime_ns) != self._times:
+            self._require_content()
+
+    def require_read_back(self) -> None:
+        """As :meth:`require_intact`, by reading all of it: the times of a file have a coarse step."""
+        self.require_intact()
+        self._require_content()
+
+    def _require_content(self) -> None:
+        with atomic_files.os_errors("cannot be read", self.path):
+            times, digest = self._times_of_file(), self._digest_of_file()
+        if digest.digest() != self._digest.digest():
+            raise self._lost("was changed")
+        self._times = times
+
+    def _lost(self, why: str) -> EvidenceLost:
+        problem = f"the journal of this run {why}, and nothing is done that would rest on it"
+        action = "Put it back as this run wrote it and resume, or begin a new run"
+        return EvidenceLost(problem, subject=self.path, action=action)
+
+    def _times_of_file(self) -> tuple[int, int]:
+        status = os.fstat(self._descriptor)
+        return status.st_mtime_ns, status.st_ctime_ns
+
+    def _digest_of_file(self) -> "hashlib._Hash":
+        """The sum of all whole lines, as the file has them now."""
+        digest, place = hashlib.sha256(), 0
+        while part := os.pread(self._descriptor, min(_PART, self._whole - place), place):
+            digest.update(part)
+            place += len(part)
+        return digest
 
     def close(self) -> None:
         """Close the file, which releases its lock."""

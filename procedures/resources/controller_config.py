@@ -124,11 +124,15 @@ _UNDOES = {WriteKind.RESULT: WriteKind.TAKEN_BACK, WriteKind.PROVISIONAL: WriteK
 
 @dataclass(frozen=True, eq=False)
 class ConfigChanges:
-    """Changes the config of one run, and makes the controller read it."""
+    """Changes the config of one run, and makes the controller read it.
+
+    ``require_evidence`` raises ``EvidenceLost`` if there is no journal on which a change could rest.
+    """
 
     cell: Cell
     startup: Startup
     folder: RunFolder
+    require_evidence: Callable[[], None]
 
     @property
     def provisional_backup(self) -> Path:
@@ -161,6 +165,7 @@ class ConfigChanges:
 
         That is a ``WriteBackUndone`` if the controller did not read it; its config is as before.
         """
+        await in_thread(self.require_evidence)  # a person may have taken hours to approve it
         receipt = await self.write(change, backup, cause)
         try:
             await self.startup.reload()

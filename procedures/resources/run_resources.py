@@ -1,6 +1,6 @@
 """What a step uses to do its work: the devices under guards, the clock, the operator, the run folder."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -39,11 +39,16 @@ ARRIVAL_PIECES = 240
 """Pieces of a line along which joints are followed: of 100 mm, a reversal within one is of 2 um."""
 
 
+def _is_assumed() -> None:
+    """A replay writes no journal."""
+
+
 @dataclass(frozen=True, eq=False)
 class RunResources:
     """The resources of one run; a replay has others of the same kind.
 
-    The controller refuses at most ``most_refusals`` poses of one set; then a person is to look at its
+    ``require_evidence`` raises ``EvidenceLost`` if the journal is no longer what the run wrote. The
+    controller refuses at most ``most_refusals`` poses of one set; then a person is to look at its
     limits.
     """
 
@@ -55,6 +60,7 @@ class RunResources:
     folder: RunFolder
     thermometers: Thermometers = field(default_factory=Thermometers)
     most_refusals: int = 40
+    require_evidence: Callable[[], None] = _is_assumed
 
     @property
     def settings(self) -> CellSettings:
@@ -80,7 +86,7 @@ class RunResources:
     @cached_property
     def config(self) -> ConfigChanges:
         """What changes the controller's config."""
-        return ConfigChanges(self.cell, self.startup, self.folder)
+        return ConfigChanges(self.cell, self.startup, self.folder, self.require_evidence)
 
     @cached_property
     def edits(self) -> ConfigEdits:

@@ -85,8 +85,9 @@ class Rig:
         """Begin, or go on where the folder's journal ends; ``engine`` is the one that does."""
         self.folder.path.mkdir(exist_ok=True)
         broker = QuestionBroker(self.performer.operator)
-        performer = replace(self.performer, operator=broker)
         with Journal(self.folder.journal) as journal:
+            evidence = journal.require_read_back
+            performer = replace(self.performer, operator=broker, require_evidence=evidence)
             engine = self.engine = Engine(performer, journal, listeners, broker=broker, policy=policy)
             if engine.state.started is None:
                 engine.record(self.started())

@@ -32,7 +32,7 @@ from hexacell.text.verdict import teaching_line, teaching_sentence
 from procedures.calibration.calibration import Mode, expected_records
 from procedures.engine.commands import CommandQueue, UnattendedOperator
 from procedures.engine.engine import Listener
-from procedures.journal.journal import read_journal
+from procedures.journal.journal import is_evidence_lost, read_journal
 from procedures.run.state import RunState, fold
 from procedures.run.trips import may_still_move
 from procedures.steps import events
@@ -174,9 +174,10 @@ def execute_run(request: RunRequest, console: Console, further: Sequence[Listene
     except HexacellError as error:
         if may_still_move(error):  # before anything else is said
             console.error(str(error).partition("\n")[0])
-        if progress.has_started:
+        state = state_of(request.folder)
+        if progress.has_started and state.started is not None and not is_evidence_lost(error):
             console.print(f"Stopped; what was measured is kept. To continue:\n  {resume_command(request)}")
-        if (progress.has_started or request.resume) and state_of(request.folder).is_unverified:
+        if (progress.has_started or request.resume) and state.is_unverified:
             console.error(UNVERIFIED)
         raise
 

@@ -1,6 +1,7 @@
 """What every command needs of its process: signals, the platform, its log, reports of its faults.
 
-SIGTERM and SIGHUP do what Ctrl-C does. ``docs/howto-host.md`` says what is tested where. Nothing
+SIGTERM does what Ctrl-C does, and so does every other signal that would end the process without a word.
+``docs/howto-host.md`` says what is tested where. Nothing
 slow is imported.
 """
 
@@ -24,19 +25,23 @@ from hexacell import __version__
 from hexacell.errors import FileError, UsageError
 from hexacell.storage.output_files import OutputFile
 
-STOP_SIGNALS = tuple(
-    number for name in ("SIGTERM", "SIGHUP") if (number := getattr(signal, name, None)) is not None
-)
-"""Sent by a service manager, or when the terminal is closed. Windows has no SIGHUP."""
+_ENDING = "TERM HUP QUIT USR1 USR2 ALRM VTALRM PROF IO XCPU PWR STKFLT"
+
+STOP_SIGNALS: tuple[int, ...] = tuple(
+    number for name in _ENDING.split() if (number := getattr(signal, f"SIG{name}", None)) is not None
+) + tuple(range(getattr(signal, "SIGRTMIN", 0), getattr(signal, "SIGRTMAX", -1) + 1))
+"""Sent by a service manager, a script or a person, or when the terminal is closed; Windows has few.
+
+Unhandled, each ends the process where it is: a robot would go on with its move, unwatched. Those that tell
+of a fault of the process itself are left alone, as it could do nothing any more.
+"""
 
 OVER_A_SOCKET = {"tui.main", "host.main"}
 """Commands that run, or reach, a run in another process."""
 
 
 @contextmanager
-def handled(
-    numbers: Iterable[signal.Signals], handler: Callable[[int, FrameType | None], object]
-) -> Iterator[None]:
+def handled(numbers: Iterable[int], handler: Callable[[int, FrameType | None], object]) -> Iterator[None]:
     """Handle signals within this context.
 
     Python handles signals in the main thread only; elsewhere nothing changes.
@@ -51,15 +56,16 @@ def handled(
 
 
 def stop_signals_as_sigint() -> AbstractContextManager[None]:
-    """Let SIGTERM and SIGHUP do what Ctrl-C does: motion stops, devices and files are released.
+    """Let ``STOP_SIGNALS`` do what Ctrl-C does: motion stops, devices and files are released.
 
     A signal that is already handled or ignored, as under ``nohup``, is left alone.
     """
     free = [number for number in STOP_SIGNALS if signal.getsignal(number) is signal.SIG_DFL]
-    return handled(free, _forward_to_sigint)
+    return handled(free, forward_to_sigint)
 
 
-def _forward_to_sigint(_number: int, frame: FrameType | None) -> None:
+def forward_to_sigint(_number: int, frame: FrameType | None) -> None:
+    """Do what Ctrl-C does."""
     # Within asyncio.run this is the loop's own handler, which cancels the running task. It is not
     # callable in a script's background job, where Ctrl-C is ignored.
     handler = signal.getsignal(signal.SIGINT)

@@ -13,7 +13,7 @@ from types import FrameType
 from typing import Any, TextIO, TypeVar
 
 from hexacell.cli.console import Console
-from hexacell.cli.process import STOP_SIGNALS, handled
+from hexacell.cli.process import STOP_SIGNALS, forward_to_sigint, handled
 from hexacell.errors import AnswerNeeded, Interruption
 from hexacell.text.layout import wrapped
 from hexacell.text.line_face import LETTERS
@@ -27,7 +27,12 @@ from procedures.steps import events
 
 Result = TypeVar("Result")
 
-ENDING_SIGNALS = (signal.SIGINT, *STOP_SIGNALS)
+KEYS = frozenset({signal.SIGINT, signal.SIGQUIT, signal.SIGTSTP})
+"""Sent by a key. A run that Ctrl-Z suspends would watch its robot no longer: the key stops it instead."""
+
+ENDING_SIGNALS: tuple[int, ...] = (signal.SIGINT, *STOP_SIGNALS, signal.SIGTSTP)
+
+_FREE = (signal.SIG_DFL, signal.default_int_handler, forward_to_sigint)
 
 APPROVER = "a person at the terminal"
 """Who approves a change, as the journal has it."""
@@ -52,8 +57,8 @@ class SignalCommands:
         Before an engine reads the queue, a signal cancels the work, which then cleans up, and an
         ``Interruption`` is raised. After the engine has ended, a signal has no effect.
         """
-        # An ignored one stays so, as Ctrl-C in a script's background job.
-        heeded = [number for number in ENDING_SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
+        # An ignored one stays so, as Ctrl-C in a script's background job, and one that somebody else uses.
+        heeded = [number for number in ENDING_SIGNALS if signal.getsignal(number) in _FREE]
         early: list[int] = []
         try:
             # An exception while the loop is being made would leave a half-made loop behind.
@@ -63,29 +68,29 @@ class SignalCommands:
             raise Interruption("interrupted") from None
 
     async def _with_handlers(
-        self, work: Coroutine[Any, Any, Result], heeded: Iterable[signal.Signals], early: list[int]
+        self, work: Coroutine[Any, Any, Result], heeded: Iterable[int], early: list[int]
     ) -> Result:
         loop, task = asyncio.get_running_loop(), asyncio.ensure_future(work)
 
         def handle(number: int, _: FrameType | None) -> None:
-            loop.call_soon_threadsafe(self._handle, signal.Signals(number), task)
+            loop.call_soon_threadsafe(self._handle, number, task)
 
         with handled(heeded, handle):
             for number in early:
                 handle(number, None)
             return await task
 
-    def _handle(self, number: signal.Signals, task: asyncio.Task[Any]) -> None:
+    def _handle(self, number: int, task: asyncio.Task[Any]) -> None:
         if self.queue.is_over:
             return
         if not self.queue.is_attended:
             task.cancel()
-        elif self._stop_requested and number is signal.SIGINT:
+        elif self._stop_requested and number == signal.SIGINT:
             self.queue.put(Abort("interrupted"))
         else:
             self._stop_requested = True
             self.queue.put(Stop("interrupted"))
-            if number is signal.SIGINT:
+            if number in KEYS:
                 self._console.print("Stopping after this step; Ctrl-C again stops motion at once.")
 
 

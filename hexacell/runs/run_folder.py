@@ -144,7 +144,7 @@ def find_run(cell: Cell, named: str) -> RunFolder:
     Raises:
         UsageError: there is no such run.
     """
-    for path in (Path(named), runs_folder(cell) / named):
+    for path in (Path(named), runs_folder(cell) / named) if named.strip() else ():
         if RunFolder(path).journal.is_file():
             return RunFolder(path)
         if RunFolder(path).attempts.is_file():

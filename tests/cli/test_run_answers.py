@@ -25,6 +25,13 @@ def fast_cell(cell_folder):
     return cell_folder
 
 
+def test_a_run_without_a_name_is_not_begun_as_one_to_resume(typed_here, fast_cell):
+    outcome = typed_here("run", fast_cell.cell, "--resume", "", "--json")
+    assert outcome.code == 2
+    assert outcome.document["error"].startswith("there is no run ''")
+    assert not fast_cell.runs()
+
+
 @pytest.mark.usefixtures("few_candidates")
 class TestUnattendedRun:
     def test_a_run_that_needs_approval_ends_and_keeps_its_proposal(self, typed_here, fast_cell, demo):

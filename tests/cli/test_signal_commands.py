@@ -28,7 +28,7 @@ def signals() -> SignalCommands:
     return SignalCommands(Console())
 
 
-def send(*numbers: signal.Signals) -> None:
+def send(*numbers: int) -> None:
     for number in numbers:
         os.kill(os.getpid(), number)
 
@@ -45,7 +45,7 @@ async def sent(*numbers: signal.Signals) -> None:
         loop.remove_signal_handler(signal.SIGUSR1)
 
 
-async def commands_after(signals: SignalCommands, *numbers: signal.Signals) -> list[Command]:
+async def commands_after(signals: SignalCommands, *numbers: int) -> list[Command]:
     """The commands that an engine receives."""
     with signals.queue.attended():
         send(*numbers)
@@ -53,7 +53,7 @@ async def commands_after(signals: SignalCommands, *numbers: signal.Signals) -> l
 
 
 STOP, ABORT = Stop("interrupted"), Abort("interrupted")
-INT, TERM, HUP = ENDING_SIGNALS
+INT, TERM, HUP = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 
 
 @pytest.mark.parametrize(
@@ -71,6 +71,27 @@ def test_the_first_signal_stops_and_a_second_ctrl_c_aborts(signals, numbers, com
     assert signals.run(commands_after(signals, *numbers)) == commands
     hint = "Stopping after this step; Ctrl-C again stops motion at once.\n"
     assert capsys.readouterr().out == (hint if numbers[0] is INT else "")
+
+
+@pytest.mark.parametrize("number", ENDING_SIGNALS, ids=str)
+def test_no_signal_ends_or_suspends_a_run_without_a_word(signals, number: int) -> None:
+    former = signal.signal(number, signal.SIG_DFL)  # this test run may use it
+    try:
+        assert signals.run(commands_after(signals, number)) == [STOP]
+    finally:
+        signal.signal(number, former)
+
+
+def test_every_signal_that_would_end_a_process_is_heeded_or_has_a_reason() -> None:
+    cannot_be = {signal.SIGKILL, signal.SIGSTOP}
+    faults = {
+        getattr(signal, f"SIG{name}") for name in ["ABRT", "BUS", "FPE", "ILL", "SEGV", "SYS", "TRAP"]
+    }
+    harmless = {getattr(signal, f"SIG{name}") for name in ["CHLD", "CONT", "URG", "WINCH"]}
+    ignored_by_python = {signal.SIGPIPE, signal.SIGXFSZ}
+    of_the_shell = {signal.SIGTTIN, signal.SIGTTOU}  # a job in the background asks for the terminal
+    known = {*ENDING_SIGNALS, *cannot_be, *faults, *harmless, *ignored_by_python, *of_the_shell}
+    assert set(signal.Signals) - known == set()
 
 
 def test_before_an_engine_runs_the_work_is_cancelled_and_cleans_up_undisturbed(signals) -> None:

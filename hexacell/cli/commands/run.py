@@ -71,7 +71,7 @@ def _request(options: argparse.Namespace, console: Console, mode: Mode) -> RunRe
     attended = is_interactive() and not options.unattended
     return RunRequest(
         cell=cell,
-        folder=run_to_resume(cell, options.resume) if options.resume else new_run(cell),
+        folder=run_to_resume(cell, options.resume) if options.resume is not None else new_run(cell),
         mode=mode,
         operator=TerminalOperator(console) if attended else UnattendedOperator(),
         unattended=not attended,
@@ -159,8 +159,8 @@ def _copied(request: RunRequest, stream: EventStream | None) -> list[Listener]:
 def execute_run(request: RunRequest, console: Console, further: Sequence[Listener] = ()) -> events.Ended:
     """Carry out a run with a progress bar; ``further`` listeners hear of every event too.
 
-    Ctrl-C, SIGTERM or SIGHUP ends it after the step in progress, a second Ctrl-C at once. Raises
-    ``HexacellError``.
+    Ctrl-C, or any signal that ends a process, ends it after the step in progress, a second Ctrl-C at once.
+    Raises ``HexacellError``.
     """
     listed = pose_list_of(request.cell)
     expected = expected_records(

@@ -55,7 +55,7 @@ async def _serve_cell(cell: Cell, options: argparse.Namespace) -> None:
 
 
 def _until_stopped(serving: Coroutine[Any, Any, None]) -> ExitCode:
-    """Serve until Ctrl-C, SIGTERM or SIGHUP cancels it, which is its ordinary end."""
+    """Serve until Ctrl-C or a signal cancels it, which is its ordinary end."""
     with suppress(KeyboardInterrupt):
         asyncio.run(serving)
     return ExitCode.DONE

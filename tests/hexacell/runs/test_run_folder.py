@@ -75,7 +75,7 @@ def test_a_run_is_found_by_its_folder_or_its_name(cell: Cell) -> None:
 def test_a_folder_without_a_journal_is_no_run(cell: Cell) -> None:
     run = new_run(cell)
     run.create(cell)
-    for named in (run.path.name, str(run.path), "", "nonsense"):
+    for named in (run.path.name, str(run.path), "", " ", "nonsense"):
         with pytest.raises(UsageError, match="there is no run") as refusal:
             find_run(cell, named)
         assert str(runs_folder(cell)) in str(refusal.value)

@@ -4,6 +4,8 @@ import asyncio
 from contextlib import suppress
 from dataclasses import dataclass
 
+from hexacell.cell.described_devices import BOOT_S
+
 
 @dataclass(frozen=True, slots=True)
 class SearchTimeouts:
@@ -15,6 +17,7 @@ class SearchTimeouts:
         adapter: for a CAN adapter, and for the first node on a bus.
         node: for each further node on a bus.
         listen: to what devices send unasked.
+        restart: for those that restart because their port was opened, where nothing came.
         controller: for the greeting of a controller.
     """
 
@@ -23,6 +26,7 @@ class SearchTimeouts:
     adapter: float = 2.0
     node: float = 0.5
     listen: float = 1.0
+    restart: float = BOOT_S
     controller: float = 2.0
 
 

@@ -13,8 +13,10 @@ from drivers.gauges.protocol import Probe
 from drivers.gauges.visa import IDENTIFY, VisaGauge, line_to
 from drivers.interfaces import Gauge
 from drivers.serial.port import SerialPort
-from drivers.serial.request_port import NoAnswer
+from drivers.serial.received import SHOWN_BYTES, is_text, quoted
+from drivers.serial.request_port import FrameLog, NoAnswer
 from drivers.serial.shared_port import SharedSerialPorts
+from hexacell.cell.described_devices import BOOT_S
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError, HexacellError
 
@@ -87,6 +89,7 @@ async def search_port(
     heard: list[str] = []
     for protocol, baudrate in tries:
         settings = _settings(protocol, port, timeouts.gauge, baudrate)
+        settings = settings.model_copy(update={"settle_s": probes[protocol].settle_s})
         try:
             found = await _channels(factories[protocol], settings, heard)
         except HexacellError as error:
@@ -109,9 +112,9 @@ async def _identify(resource: str, timeout_s: float) -> PortFindings:
 
     def name() -> str:
         line, address = line_to(resource)
-        with closing(line(address, {}, threading.Event())) as port, suppress(NoAnswer):
+        with closing(line(address, {"settle_s": BOOT_S}, threading.Event())) as port, suppress(NoAnswer):
             port.open()
-            answer = port.exchange(IDENTIFY, VisaGauge.terminator, timeout_s)
+            answer = port.exchange(IDENTIFY + VisaGauge.terminator, VisaGauge.terminator, timeout_s)
             return answer.decode("ascii", "replace").strip()
         return ""
 
@@ -126,34 +129,38 @@ async def _listen(
     port: str, factories: Mapping[str, GaugeFactory], probes: Mapping[str, Probe], timeouts: SearchTimeouts
 ) -> PortFindings:
     """What sends by itself: gauges of a protocol, else any number."""
+    heard = ""
     for protocol, probe in probes.items():
         if (channel_of := probe.channel_of) is not None:
             rate = factories[protocol].spec.line.baudrate  # type: ignore[attr-defined]
-            frames = await asyncio.to_thread(_frames, port, rate, timeouts.listen)
+            log = await asyncio.to_thread(_log, port, rate, timeouts)
+            frames = [frame.data for frame in log.after(1)]
             channels = {channel for frame in frames if (channel := channel_of(frame)) is not None}
             if channels:
                 settings = _settings(protocol, port, timeouts.gauge)
                 found = [await _ask(factories[protocol], settings, channel) for channel in sorted(channels)]
                 return PortFindings(port, tuple(found))
     for baudrate in LISTENED_BAUD_RATES:
-        for frame in await asyncio.to_thread(_frames, port, baudrate, timeouts.listen):
-            if NUMBER.fullmatch(frame):
-                text = frame.decode("ascii")
+        log = await asyncio.to_thread(_log, port, baudrate, timeouts)
+        for frame in log.after(1):
+            if NUMBER.fullmatch(frame.data):
+                text = frame.data.decode("ascii")
                 problem = f"sends {text!r} by itself at {baudrate} baud. {DESCRIBE}"
                 return PortFindings(port, problem=problem)
-    return PortFindings(port)
+        if log.latest and (not heard or is_text(log.latest)):
+            heard = f"sends {quoted(log.latest[-SHOWN_BYTES:])} by itself at {baudrate} baud"
+    return PortFindings(port, heard=heard)
 
 
-def _frames(port: str, baudrate: int, seconds: float) -> list[bytes]:
-    """Whole lines that come within some time; the first may be part of one, and is left out."""
+def _log(port: str, baudrate: int, timeouts: SearchTimeouts) -> FrameLog:
+    """What comes within some time, of which the first line may be part of one."""
     line = SerialPort(port, {"baudrate": baudrate}, threading.Event())
     with closing(line), suppress(HexacellError):
         line.open()
-        end_s = line.now() + seconds
-        while line.now() < end_s:
+        end_s = line.now() + timeouts.listen
+        while line.now() < end_s + (0.0 if line.log.pieces else timeouts.restart):
             line.listen()
-        return [frame.data for frame in line.log.after(1)]
-    return []
+    return line.log
 
 
 async def _channels(factory: GaugeFactory, settings: GaugeSettings, heard: list[str]) -> list[FoundGauge]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from drivers.encoders.bank import BankSession, ThreadedBank
 from drivers.errors import BusError, PortLost, SilentNodeError, invalid_sample, silent_encoder
 from drivers.interfaces import DeviceIdentity
-from drivers.serial.modbus_port import FUNCTIONS, REQUEST, ModbusPort, RefusedRequest
+from drivers.serial.modbus_port import FUNCTIONS, REQUEST, ModbusPort, RefusedRequest, wrong_frame
 from drivers.serial.opening import adapter_at
 from drivers.serial.request_port import NoAnswer
 from drivers.wire_trace import TraceRecorder
@@ -96,8 +96,10 @@ class ModbusSession(BankSession):
                 action="State `port` under [encoders.modbus]",
             )
         self._url = described.port
-        self._port = ModbusPort(self._url, {**LINE, **described.serial}, closing, trace)
+        line = {**LINE, **described.serial, "settle_s": described.settle_s}
+        self._port = ModbusPort(self._url, line, closing, trace)
         self._port.subject = "encoders"
+        self._answering: set[int] = set()
 
     def close(self) -> None:
         """Close the line."""
@@ -171,16 +173,24 @@ class ModbusSession(BankSession):
         self._port.subject = span.subject
         for _ in range(DAMAGED_TRIES):
             try:
-                return self._port.exchange(request, b"", self._settings.timeout_s)
+                answer = self._port.exchange(request, b"", self._settings.timeout_s)
             except NoAnswer as error:
-                received = error.received
-                if not received:
+                missing = error
+                if not missing.received:
                     break
+            else:
+                self._answering.add(span.device)
+                return answer
         what = f"does not answer within {self._settings.timeout_s:g} s"
         check = "its supply and cable, and devices and serial in [encoders.modbus]"
-        if received:
-            what = f"answers {received!r}, no single frame with a right checksum, {DAMAGED_TRIES} times"
-            check = "its cable, and serial in [encoders.modbus]"
+        if self._answering - {span.device}:
+            what += f", while device {min(self._answering - {span.device})} on the same line does"
+            check = "its own supply, and devices in [encoders.modbus]"
+        if missing.received:
+            came, _ = wrong_frame(missing.beside_echo, span.device)
+            what = f"answers {came}, {DAMAGED_TRIES} times"
+            check = "its cable, devices and serial in [encoders.modbus]"
+        self._answering.discard(span.device)
         raise silent_encoder(what, span.subject, check)
 
 

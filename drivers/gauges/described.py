@@ -20,7 +20,7 @@ from drivers.gauges.protocol import (
 )
 from drivers.gauges.serial_gauge import SerialGauge, ValueOnlyGauge
 from drivers.gauges.streaming import Origin, StreamingGauge
-from drivers.serial.modbus_port import FUNCTIONS, REQUEST, ModbusPort
+from drivers.serial.modbus_port import FUNCTIONS, REQUEST, ModbusPort, wrong_frame
 from drivers.serial.request_port import LINE_ENDS
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.described_devices import NUMBER, DescribedFrame
@@ -35,6 +35,7 @@ class _DescribedGauge(SerialGauge):
     protocol: ClassVar[str]
     vendors: ClassVar[str]
     frame: DescribedFrame
+    answer_check = "answer, protocol"
 
     @property
     def spec(self) -> ProtocolSpec:  # type: ignore[override]
@@ -55,6 +56,8 @@ class _DescribedGauge(SerialGauge):
         if not NUMBER.fullmatch(number):
             return None
         decimals = len(number.partition(".")[2]) + decimals_of(self.frame.mm_per_unit)
+        if "E" in number.upper():  # such numbers have as many digits, not decimals, each time
+            decimals = decimals_of(self.settings.resolution_mm or 0.001)
         return DisplayedValue(float(number) * self.frame.mm_per_unit, decimals, Unit.MM, text)
 
     def _is_at_end(self, text: str) -> bool:
@@ -66,6 +69,7 @@ class RequestGauge(_DescribedGauge, ValueOnlyGauge):
     """A gauge by request and answer."""
 
     protocol, vendors = "request", "gauge by request"
+    silence_check = "ask with its line end"
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
         super().__init__(settings, ports)
@@ -85,8 +89,12 @@ class StreamGauge(_DescribedGauge, StreamingGauge):
         super().__init__(settings, ports)
         example = "stream = { answer = ..., example = ... }"
         stream = self._described(settings.stream, "does not say what it sends", example)
-        self.frame = stream
+        self.frame = self._stream = stream
         self.channel = settings.channel if stream.has_channel else None
+
+    def _line_settings(self) -> dict[str, object]:
+        end = self._stream.ends_with
+        return super()._line_settings() | ({} if end is None else {"frame_end": end.encode("latin-1")})
 
     def _origin(self, frame: bytes) -> Origin:
         text = frame.decode("latin-1")
@@ -138,10 +146,8 @@ class ModbusGauge(ValueOnlyGauge):
         )
 
     def _garbled(self, received: bytes) -> DeviceError:
-        action = "Check its cable, and its baud rate and parity against serial in the cell file"
-        return self._error(
-            WrongAnswer, f"answers {received!r}, no single frame with a right checksum", action
-        )
+        what, action = wrong_frame(received, self._modbus.device)
+        return self._error(WrongAnswer, f"answers {what}", action)
 
     def _parse_value(self, frame: bytes) -> DisplayedValue:
         if len(frame) != self._format.size:

@@ -20,7 +20,7 @@ class IdHGauge(ValueOnlyGauge):
     feed (ID-H manual 99MAH016B, page 4-5). An inch display has five decimals.
     """
 
-    spec = ProtocolSpec("mitutoyo-id-h", "Mitutoyo ID-H", LineSettings(9600), "GN01,+0016.2345\r\n")
+    spec = ProtocolSpec("mitutoyo-id-h", "Mitutoyo ID-H", LineSettings(9600), "GN01,+0016.2345\r\n", 5)
     has_channels = True
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:

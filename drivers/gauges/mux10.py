@@ -3,7 +3,8 @@
 Line 9600 8N1. The channel number requests its value: ``0``, channel, ``A``, sign, eight characters of
 digits and point. An error is three digits beginning with 9: the last is 1 if no gauge answered, 8 if the
 multiplexer is busy. The second is 1 in the sources seen; the channel is accepted too. Nothing says the
-unit: five decimals are inches. Hold, direction and preset cannot be asked for.
+unit: five decimals are inches, unless the cell file states such a resolution. Hold, direction and preset
+cannot be asked for.
 """
 
 import asyncio
@@ -53,7 +54,7 @@ def parse_identification(frame: bytes) -> str:
 class Mux10Gauge(SerialGauge):
     """A dial indicator on one channel of a Mitutoyo MUX-10 or a multiplexer with its format."""
 
-    spec = ProtocolSpec("mux10", "Mitutoyo MUX-10 channel", LineSettings(9600), "01A+0000.123\r")
+    spec = ProtocolSpec("mux10", "Mitutoyo MUX-10 channel", LineSettings(9600), "01A+0000.123\r", 5)
     probe = Probe((19200, 4800, 2400, 38400, 57600, 115200))
     has_channels = True
     busy_pause_s = 0.05

@@ -35,12 +35,17 @@ class LineSettings:
 
 @dataclass(frozen=True, slots=True)
 class ProtocolSpec:
-    """One protocol: its name in the cell file, its vendors, its line, and a typical answer."""
+    """One protocol: its name in the cell file, its vendors, its line, and a typical answer.
+
+    ``inch_decimals`` are those of a display set to inches, where the makers' manuals say so, and no answer
+    names the unit. Decimals tell nothing by themselves: firmware sends mm with as many as it likes.
+    """
 
     protocol: str
     vendors: str
     line: LineSettings
     example: str
+    inch_decimals: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,12 +54,14 @@ class Probe:
 
     Attributes:
         other_baud_rates: of instruments that come set to other rates than the protocol's usual one.
+        settle_s: how long devices of this protocol may restart because the port was opened.
         is_last: asked after all others, because instruments of other protocols mistake its question.
         channel_of: for gauges that send unasked: the channel whose value a frame is, None for other frames.
             The line is then listened to, and nothing is asked.
     """
 
     other_baud_rates: tuple[int, ...] = ()
+    settle_s: float = 0.0
     is_last: bool = False
     channel_of: Callable[[bytes], int | None] | None = None
 
@@ -140,9 +147,6 @@ ALIKE_DIGITS, ALIKE_SHARE = 2.5, 0.1
 
 MIDDLE_OF = 3
 
-INCH_DECIMALS = 5
-"""Decimals of a display set to inches. Six are no hint: public firmware for Digimatic sends mm so."""
-
 
 def decimals_of(resolution_mm: float) -> int:
     """The decimals of a display in mm with this resolution: 3 for 0.001 and for 0.005."""
@@ -153,8 +157,8 @@ def decimals_of(resolution_mm: float) -> int:
 class DisplayHistory:
     """What one gauge has shown: every value must fit to the others.
 
-    The number of decimals holds from the first opening on: where a protocol does not name the unit, only it
-    tells inches from millimetres. The values hold from one opening to the next.
+    The number of decimals holds from the first opening on: where no answer names the unit, a change of it
+    shows that of the unit. The values hold from one opening to the next.
     """
 
     def __init__(self, settings: GaugeSettings) -> None:
@@ -162,7 +166,7 @@ class DisplayHistory:
         self._span_mm = TRAVEL_MARGIN * zeros * settings.travel_mm
         self._travel_mm = settings.travel_mm
         self._stated = settings.resolution_mm
-        self._decimals = None if self._stated is None else decimals_of(self._stated)
+        self._decimals: int | None = None
         self.agreement_mm = AGREEMENT_MM if settings.agreement_mm is None else settings.agreement_mm
         self._range: tuple[float, float] | None = None
 
@@ -193,28 +197,38 @@ class DisplayHistory:
         """The gauge was opened: its zero may be another one."""
         self._range = None
 
-    def is_inch(self, shown: DisplayedValue, set_to: Unit | None) -> bool:
+    def is_inch(self, shown: DisplayedValue, set_to: Unit | None, inch_decimals: int | None) -> bool:
         """Whether a value is in inches.
 
         What the answer names decides, then what the instrument says it is set to, or the stated resolution,
-        while the decimals are as before. Only where nothing else tells the unit, decimals do.
+        while the decimals are as before. Only where nothing else tells the unit, the decimals do that
+        the protocol has in inches; else the gauge trial decides.
         """
         if shown.unit is not None:
             return shown.unit is Unit.INCH
         is_known = set_to is Unit.MM or self._stated is not None
-        if is_known and self._decimals in {None, shown.decimals}:
+        if is_known and self._has_its_decimals(shown):
             return False
-        return shown.decimals == INCH_DECIMALS
+        return shown.decimals == inch_decimals
 
     def other_decimals(self, shown: DisplayedValue) -> str | None:
         """Why a value has another unit or resolution, in words; None if it has not."""
-        if self._decimals is None or shown.decimals == self._decimals:
+        if self._has_its_decimals(shown):
             return None
         if self._stated is None:
             before = f"where it showed {self._decimals} when it was first opened"
         else:
-            before = f"and its resolution of {self._stated:g} mm has {self._decimals}"
+            before = f"and its resolution of {self._stated:g} mm has {decimals_of(self._stated)}"
         return f"shows {shown.decimals} decimals ({shown.text}), {before}"
+
+    def _has_its_decimals(self, shown: DisplayedValue) -> bool:
+        """Whether a value has as many decimals as before, and zeros alone beyond its stated resolution."""
+        if self._decimals not in {None, shown.decimals}:
+            return False
+        if self._stated is None or shown.decimals == (meant := decimals_of(self._stated)):
+            return True
+        rounded = round(shown.value, meant)
+        return shown.decimals > meant and abs(shown.value - rounded) < 0.5 * 10.0**-shown.decimals
 
     def beyond_travel(self, shown: DisplayedValue) -> str | None:
         """Why a value is farther from the others than the plunger travels, in words; None if it is not."""

@@ -23,15 +23,16 @@ from drivers.gauges.protocol import (
 from drivers.interfaces import DeviceIdentity, GaugeReading
 from drivers.serial.opening import adapter_at
 from drivers.serial.port import SerialPort
+from drivers.serial.received import quoted, shape_of, what_is_wrong_with
 from drivers.serial.request_port import NoAnswer, RequestPort
 from drivers.serial.shared_port import SharedSerialPort, SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
-from hexacell.errors import DeviceError, FileError
+from hexacell.errors import DeviceError, FileError, UsageError
+from hexacell.plugins import Group, load, names
 
 MAX_READINGS = 12  # enough for an oscillating ball to come to rest
 MAX_REQUESTS = 3
 MORE_STATES = 2  # the settings are asked for so often again before something is wrong with them
-BIT_7 = 0x80
 INCH = ("answers in inch", "Press its in/mm key")
 
 Parsed = TypeVar("Parsed")
@@ -53,6 +54,9 @@ class SerialGauge(ABC):
         normal_modes: modes, among those that the instrument reports, in which readings are valid.
         value_request: the request for the displayed value.
         terminator: ends an answer.
+        verb: what it does with its values: it answers, or sends.
+        answer_check: what in the cell file may be wrong where its answers are others.
+        silence_check: what may keep it silent, beside its supply, its cable and its port.
         port_factory: makes the line behind its port.
         channel: the input of a shared multiplexer; None if the gauge uses the line alone.
     """
@@ -63,6 +67,9 @@ class SerialGauge(ABC):
     normal_modes: ClassVar[frozenset[str]] = frozenset()
     value_request: bytes
     terminator: bytes = TERMINATOR
+    verb: str = "answers"
+    answer_check: str = "protocol"
+    silence_check: str = "protocol"
     port_factory: type[RequestPort] = SerialPort
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
@@ -75,6 +82,7 @@ class SerialGauge(ABC):
         self._session = 0
         self._state: GaugeState | None = None
         self._void: ZeroVoid | None = None
+        self._last_frame = b""
         self._history = DisplayHistory(settings)
 
     @property
@@ -178,7 +186,8 @@ class SerialGauge(ABC):
         self._port.take_unsolicited()
 
     def _line_settings(self) -> dict[str, object]:
-        return {**asdict(self.spec.line), **self.settings.serial}
+        settle_s = self.settings.settle_s
+        return {**asdict(self.spec.line), **self.settings.serial, "settle_s": settle_s}
 
     def _described(self, section: Stated | None, problem: str, example: str) -> Stated:
         """The section of the cell file that describes a gauge of this protocol."""
@@ -192,7 +201,8 @@ class SerialGauge(ABC):
     def _plausible(self, frame: bytes) -> DisplayedValue:
         """The value in an answer, which is in mm and fits to those before; raises as ``_parse_value``."""
         shown = self._parse_value(frame)
-        if self._history.is_inch(shown, None if self._state is None else self._state.unit):
+        set_to = None if self._state is None else self._state.unit
+        if self._history.is_inch(shown, set_to, self.spec.inch_decimals):
             raise self._error(WrongSetting, *INCH)
         if reason := self._history.other_decimals(shown):
             action = "Press its in/mm key, or correct resolution_mm in the cell file"
@@ -206,7 +216,7 @@ class SerialGauge(ABC):
     async def _query(self, request: bytes, parse: Callable[[bytes], Parsed]) -> Parsed:
         """The parsed answer; the request is repeated if ``parse`` rejects the frame."""
         rejected: list[FrameRejected] = []
-        for _ in range(MAX_REQUESTS):
+        while len(rejected) < MAX_REQUESTS or self._is_restarting():
             try:
                 return parse(await self._ask(request))
             except FrameRejected as rejection:
@@ -217,20 +227,37 @@ class SerialGauge(ABC):
     async def _ask(self, request: bytes) -> bytes:
         port = self._open_port()
         try:
-            return await port.exchange(request, self.terminator, self.settings.timeout_s)
+            self._last_frame = await port.exchange(request, self.terminator, self.settings.timeout_s)
         except NoAnswer as missing:
-            beside_echo = missing.received.replace(request, b"")
-            echo = beside_echo != missing.received
-            is_lone_line_end = bool(beside_echo) and not echo  # the answer before it was lost
-            if beside_echo.strip() or is_lone_line_end:
-                raise FrameRejected(beside_echo) from missing
+            is_lone_line_end = bool(missing.beside_echo) and not missing.is_echoed  # the answer was lost
+            if missing.beside_echo.strip() or is_lone_line_end:
+                raise FrameRejected(missing.beside_echo) from missing
             self._log.warning("no answer to %r within %g s", request, self.settings.timeout_s)
-            problem = f"does not answer within {self.settings.timeout_s:g} s on port {port.url}"
-            action = "Switch it on, check its cable, and port in the cell file"
-            if echo:
-                problem = f"only the echo of the request comes back from port {port.url}"
-                action = "Switch the gauge on and check that the cable is not looped"
-            raise self._error(GaugeSilent, problem, action) from missing
+            raise self._silent(port, is_echoed=missing.is_echoed) from missing
+        port.note_answer(self.name)
+        return self._last_frame
+
+    def _silent(self, port: SharedSerialPort, *, is_echoed: bool) -> GaugeSilent:
+        """The error for a gauge of which nothing came, and what follows from what did."""
+        problem = f"does not answer within {self.settings.timeout_s:g} s on port {port.url}"
+        others = f"port, serial and {self.silence_check}"
+        action = f"Switch it on, check its cable, and {others} in the cell file"
+        if other := port.answering_beside(self.name):
+            problem += f", while gauge {other} on it does"
+            action = "Switch it on, and check its own cable, and its channel or address in the cell file"
+        elif is_echoed:
+            problem = f"only the echo of the request comes back from port {port.url}"
+            action = "Switch the gauge on and check that the cable is not looped"
+        elif self._state is not None:
+            problem += f", where it did: {quoted(self._last_frame)} came last"
+            action = "Look whether it is on and its cable in place"
+        else:
+            action += "; if it restarts when its port is opened, settle_s there"
+        return self._error(GaugeSilent, problem, action)
+
+    def _is_restarting(self) -> bool:
+        """Whether it may be: what it sends then, such as a banner, is no answer."""
+        return self._state is None and self._open_port().line.settles_for_s() > 0.0
 
     def _require_silence(self) -> None:
         self._open_port().require_silence()
@@ -248,15 +275,14 @@ class SerialGauge(ABC):
 
     def _garbled(self, received: bytes) -> DeviceError:
         """The error for repeated answers that are no frames of the protocol."""
-        protocol = self.spec.protocol
-        if any(byte & BIT_7 for byte in received):
-            problem = f"answers {received!r}, bytes with bit 7 set"
-            action = f"Check parity settings and baud rate: {protocol} uses {self.spec.line}"
-        else:
-            problem = (
-                f"answers {received!r} where protocol {protocol} has answers like {self.spec.example!r}"
-            )
-            action = "Correct protocol or port in the cell file"
+        protocol, came = self.spec.protocol, f"{self.verb} {quoted(received)}"
+        usual = f"{protocol} uses {self.spec.line}"
+        if found := what_is_wrong_with(received, self.terminator, usual):
+            return self._error(WrongAnswer, f"{came}, {found[0]}", found[1])
+        problem = f"{came} where protocol {protocol} has answers like {self.spec.example!r}"
+        action = f"Correct {self.answer_check} or port in the cell file"
+        if (alike := _protocols_like(received)) and protocol not in alike:
+            action = f"Correct protocol in the cell file: answers of {' and '.join(sorted(alike))} are such"
         return self._error(WrongAnswer, problem, action)
 
     async def _confirmed(self, state: GaugeState, before: GaugeState | None = None) -> GaugeState:
@@ -308,6 +334,17 @@ class SerialGauge(ABC):
         if self._port.line.open_count != self._session:
             raise self._voided("lost its port meanwhile")
         return self._port
+
+
+def _protocols_like(answer: bytes) -> set[str]:
+    """The protocols whose typical answer differs from an answer in its numbers alone."""
+    found, shape = set(), shape_of(answer)
+    for name in names(Group.GAUGES):
+        with suppress(UsageError):  # a package of somebody else that is broken
+            spec = getattr(load(Group.GAUGES, name), "spec", None)
+            if isinstance(spec, ProtocolSpec) and shape_of(spec.example.encode("latin-1")) == shape:
+                found.add(name)
+    return found
 
 
 class ValueOnlyGauge(SerialGauge):

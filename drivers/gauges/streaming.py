@@ -8,11 +8,12 @@ from abc import abstractmethod
 from enum import Enum, auto
 from typing import ClassVar
 
-from drivers.errors import EmptyChannel, GaugeSilent
+from drivers.errors import EmptyChannel, GaugeSilent, WrongAnswer
 from drivers.gauges.protocol import FrameRejected
 from drivers.gauges.serial_gauge import ValueOnlyGauge
 from drivers.interfaces import GaugeReading
 from drivers.serial.opening import SLICE_S
+from drivers.serial.received import SHOWN_BYTES, quoted
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
 from hexacell.clock import Patience
@@ -35,7 +36,8 @@ class StreamingGauge(ValueOnlyGauge):
         usual_delay_s: how long ago a value may have been measured when it comes, unless the cell file says.
     """
 
-    value_request = b""
+    value_request = terminator = b""
+    verb = "sends"
     usual_delay_s: ClassVar[float] = 0.1
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
@@ -75,7 +77,8 @@ class StreamingGauge(ValueOnlyGauge):
         """The next fresh frame of this gauge."""
         port = self._open_port()
         now_s = port.listened.now()
-        patience = Patience(max(0.0, self._fresh_from_s - now_s) + self.settings.timeout_s, SLICE_S, now_s)
+        wait_s = max(self._fresh_from_s - now_s, port.line.settles_for_s(), 0.0) + self.settings.timeout_s
+        patience, pieces = Patience(wait_s, SLICE_S, now_s), port.listened.log.pieces
         heard: dict[Origin, bytes] = {}
         while True:
             for frame in port.listened.log.after(self._latest):
@@ -84,18 +87,27 @@ class StreamingGauge(ValueOnlyGauge):
                 if frame.began_after_s < self._fresh_from_s:
                     continue
                 if origin is Origin.OWN:
+                    self._last_frame = frame.data
                     return frame.data
                 heard[origin] = frame.data
             if patience.left_s(port.listened.now()) <= 0.0:
-                raise self._missing(heard)
+                raise self._missing(heard, (port.listened.log.pieces - pieces) / wait_s)
             await port.listen()
             port = self._open_port()
 
-    def _missing(self, heard: dict[Origin, bytes]) -> DeviceError | FrameRejected:
-        """Why there was no frame, from those of other origins."""
+    def _missing(self, heard: dict[Origin, bytes], pieces_s: float) -> DeviceError | FrameRejected:
+        """Why there was no frame, from those of other origins, or from what came ``pieces_s`` a second."""
         if Origin.UNKNOWN in heard:
             return FrameRejected(heard[Origin.UNKNOWN])
+        last = f"; {quoted(self._last_frame)} came last" if self._last_frame else ""
         waited = f"sends nothing for {self.settings.timeout_s:g} s"
+        if pieces_s and not heard:
+            came = quoted(self._open_port().listened.log.latest[-SHOWN_BYTES:])
+            return self._error(
+                WrongAnswer,
+                f"sends {pieces_s:.2g} a second, in another form: {came} came last, without a line end",
+                "Correct baud rate in serial, or answer and ends_with of protocol stream, in the cell file",
+            )
         if Origin.ANOTHER_GAUGE in heard:
             return self._error(
                 EmptyChannel,
@@ -105,9 +117,9 @@ class StreamingGauge(ValueOnlyGauge):
             )
         return self._error(
             GaugeSilent,
-            f"{waited} on port {self.settings.port}",
+            f"{waited} on port {self.settings.port}{last}",
             "Switch it on and have it send by itself, move its plunger off an end, check its cable, "
-            "and port in the cell file",
+            "port in the cell file, and settle_s there if it restarts when its port is opened",
         )
 
     def _require_silence(self) -> None:

@@ -64,7 +64,7 @@ class SylvacGauge(SerialGauge):
 
     # duplex cables are powered by DTR high and RTS low
     spec = ProtocolSpec(
-        "sylvac", "Sylvac opto-RS indicator", LineSettings(4800, 7, "E", 2, rts=False), "+12.345\r"
+        "sylvac", "Sylvac opto-RS indicator", LineSettings(4800, 7, "E", 2, rts=False), "+12.345\r", 5
     )
     normal_modes = frozenset({"NOR", "REF", "REF1", "REF2"})
     value_request = b"?\r"

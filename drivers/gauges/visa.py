@@ -35,7 +35,7 @@ PURE_PYTHON = "@py"
 MS = 1000.0
 SOCKET = re.compile(r"TCPIP\d*::(?P<host>[^:]+)::(?P<port>\d+)::SOCKET", re.IGNORECASE)
 SERIAL = re.compile(r"ASRL(?P<port>.+?)(?:::INSTR)?", re.IGNORECASE)
-IDENTIFY = b"*IDN?\n"
+IDENTIFY = b"*IDN?"
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[Ee][+-]?\d{1,3})?")
 TEXT = re.compile(rb"[ -~]{1,200}")
 INFINITE = 9.9e37
@@ -78,11 +78,11 @@ class VisaPort(RequestPort):
                     subject=self.subject,
                     action="Check the instrument and port in the cell file",
                 ) from error
-            self.open_count += 1
+            self._opened()
             self._must_clear = False
         return self.open_count
 
-    def exchange(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
+    def _exchange_once(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
         """Send ``request``; its answer, which ends with ``terminator``."""
         self.require_not_closed()
         if self._resource is None:
@@ -100,7 +100,7 @@ class VisaPort(RequestPort):
             raise lost_port(self.subject, self.url, str(error), "Connect it") from error
         if not received.endswith(terminator):
             self._must_clear = True
-            raise NoAnswer(received)
+            raise NoAnswer(received, request)
         return received
 
     def close(self) -> None:
@@ -128,6 +128,7 @@ class VisaGauge(SerialGauge):
     spec = ProtocolSpec("visa", "instrument with SCPI", LineSettings(9600), "+1.23450000E-03\n")
     probe = None
     terminator = b"\n"
+    silence_check = "line_end, ends_with"
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
         if settings.port is not None:
@@ -136,7 +137,9 @@ class VisaGauge(SerialGauge):
         super().__init__(settings, ports)
         self._visa = self._described(settings.visa, "does not say what is asked", "visa = { ask = ... }")
         self.channel = settings.channel if self._visa.has_channel else None
-        self.value_request = self._visa.question(settings.channel).encode("latin-1") + b"\n"
+        self.terminator = self._visa.ends_with.encode("latin-1")
+        self._line_end = self._visa.line_end.encode("latin-1")
+        self.value_request = self._visa.question(settings.channel).encode("latin-1") + self._line_end
         self._decimals = decimals_of(settings.resolution_mm or 0.001)
 
     def _line_settings(self) -> dict[str, object]:
@@ -155,9 +158,11 @@ class VisaGauge(SerialGauge):
         return DisplayedValue(number * self._visa.mm_per_unit, self._decimals, Unit.MM, text)
 
     async def _read_state(self) -> GaugeState:
-        identification = await self._query(IDENTIFY, _text) if self._visa.identify else None
+        asked = IDENTIFY + self._line_end
+        identification = await self._query(asked, _text) if self._visa.identify else None
         for question, expected in self._visa.expect.items():
-            answer = await self._query(question.encode("latin-1") + b"\n", partial(_setting, expected))
+            query = question.encode("latin-1") + self._line_end
+            answer = await self._query(query, partial(_setting, expected))
             if answer != expected:
                 return GaugeState(identification, mode=f"{question} {answer}, not {expected}")
         return GaugeState(identification)

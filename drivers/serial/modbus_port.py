@@ -11,10 +11,12 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
+from importlib import import_module
 from typing import Any
 
 from drivers.errors import optional
 from drivers.serial.opening import SLICE_S, lost_port, opened_port, sent
+from drivers.serial.received import is_text, quoted
 from drivers.serial.request_port import NoAnswer, RequestPort, is_copies
 from drivers.wire_trace import TrafficDirection
 from hexacell.clock import Patience
@@ -51,6 +53,22 @@ LINE_KEYS = ("baudrate", "bytesize", "parity", "stopbits")
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 
 
+def wrong_frame(received: bytes, device: int) -> tuple[str, str]:
+    """What came in place of one frame of a device, as far as the bytes tell, and what to do."""
+    check = "its cable, and its baud rate and parity against serial in the cell file"
+    if not received:
+        return "only the echo of the request", f"Switch the device on, check its address and {check}"
+    if is_text(received):
+        what = "Modbus ASCII" if received.startswith(b":") else "text, no Modbus"
+        return f"{what}: {quoted(received)}", "Set it to Modbus RTU, or correct port in the cell file"
+    checksum = import_module("pymodbus.framer").FramerRTU.compute_CRC(received[:-2])
+    if received[0] != device and checksum == int.from_bytes(received[-2:]):
+        action = "Correct device in the cell file, and give each device on the line its own"
+        return f"a frame of device {received[0]}, not {device}", action
+    what = f"{quoted(received)}, no single frame with a right checksum"
+    return what, f"Check {check}, and that no other device has its address"
+
+
 class RefusedRequest(DeviceError):
     """A device answers that it cannot do what it is asked; ``is_absence``: it has no such registers."""
 
@@ -62,7 +80,7 @@ class ModbusPort(RequestPort):
 
     _client: Any = None
     _modbus: Any = None
-    _received = _frame = b""
+    _received = _frame = _sent = b""
 
     def open(self) -> int:
         """Open the line unless it is open; how often it has been opened."""
@@ -82,11 +100,11 @@ class ModbusPort(RequestPort):
             port.write = partial(sent, port.write)
             client.socket, client.recv = port, self._next_bytes
             self._client = client
-            self.open_count += 1
+            self._opened()
             self._must_clear = False
         return self.open_count
 
-    def exchange(self, request: bytes, _terminator: bytes, timeout_s: float) -> bytes:
+    def _exchange_once(self, request: bytes, _terminator: bytes, timeout_s: float) -> bytes:
         """Read registers; a device that answers with an exception, not busy, is a ``RefusedRequest``."""
         device, function, address, count = REQUEST.unpack(request)
         for _ in range(TIMES_ASKED):
@@ -110,7 +128,7 @@ class ModbusPort(RequestPort):
         frame_bytes = FRAME_BYTES + REGISTER_BYTES * count
         if len(answer.registers) != count or not self._is_alone(frame_bytes):
             self._must_clear = True  # one of several frames, of which nobody knows which is the answer
-            raise NoAnswer(self._received)
+            raise NoAnswer(self._received, self._sent)
         return struct.pack(f">{count}H", *answer.registers)
 
     def write_to_all(self, register: int, value: int) -> None:
@@ -126,30 +144,35 @@ class ModbusPort(RequestPort):
                 client.close()
 
     def _next_bytes(self, _size: int | None) -> bytes:
-        """What comes until the line pauses; nothing if nothing comes in time."""
-        port, count = self._client.socket, 0
+        """What comes until the line pauses; nothing if nothing comes in time.
+
+        The echo of the request, which adapters for two wires send, is no answer yet.
+        """
+        port, received = self._client.socket, b""
         patience = Patience(self._client.comm_params.timeout_connect, SLICE_S, time.monotonic())
         while patience.left_s(time.monotonic()) > 0.0:
             self.require_not_closed()
-            before, count = count, port.in_waiting
-            if count and count == before:
+            if new := port.read(count) if (count := port.in_waiting) else b"":
+                received += new
+            elif not self._sent.startswith(received):
                 break
             time.sleep(self._client._recv_interval)
-        received: bytes = port.read(count)
         return received
 
     def _is_alone(self, frame_bytes: int) -> bool:
         """Whether what came is one frame, or copies of it, which some adapters send."""
-        frames = self._received.lstrip(NUL)
+        frames = self._received.removeprefix(self._sent).lstrip(NUL)
         self._frame = frames[:frame_bytes]
         return is_copies(frames, self._frame)
 
     def _drop_surplus(self) -> None:
         """What came after an answer makes that doubtful, unless it is a copy of it."""
         port = self._client.socket
-        if port is not None and port.in_waiting and not is_copies(port.read(port.in_waiting), self._frame):
-            self.surplus_count += 1
-            self._must_clear = True
+        if port is not None and port.in_waiting:
+            surplus = port.read(port.in_waiting).replace(self._sent, b"")  # echo of a broadcast
+            if not is_copies(surplus, self._frame):
+                self.surplus_count += 1
+                self._must_clear = True
         if self._must_clear:
             self._clear()
 
@@ -163,10 +186,12 @@ class ModbusPort(RequestPort):
 
     def _note(self, sending: bool, data: bytes) -> bytes:
         new = data if sending else data.removeprefix(self._received)  # all since the request comes
-        if not sending:
-            self._received = data
         self._record(TrafficDirection.SENT if sending else TrafficDirection.RECEIVED, new)
-        return data if sending else data.lstrip(NUL)
+        if sending:
+            self._sent = data
+            return data
+        self._received = data
+        return data.removeprefix(self._sent).lstrip(NUL)
 
     @contextmanager
     def _requesting(self) -> Iterator[Any]:
@@ -179,7 +204,7 @@ class ModbusPort(RequestPort):
             yield self._client
         except self._modbus.exceptions.ModbusIOException as error:
             self._must_clear = True
-            raise NoAnswer(self._received) from error
+            raise NoAnswer(self._received, self._sent) from error
         except (OSError, termios.error, self._modbus.exceptions.ModbusException) as error:
             self.close()
             raise lost_port(self.subject, self.url, str(error)) from error

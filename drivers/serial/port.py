@@ -58,12 +58,11 @@ class SerialPort(RequestPort):
         super().__post_init__()
         self._parity = in_software(self._settings)
         self._port: serial.Serial | None = None
-        self._asked_at = 0.0
         self._last_traffic = 0.0
         self._silence_s = 0.0
         self._surplus = self._last_frame = b""
         self._careful = 0
-        self.log = FrameLog()
+        self.log = FrameLog(self._settings.pop("frame_end", None))
         self._empty_at = -inf
 
     def open(self) -> int:
@@ -73,16 +72,13 @@ class SerialPort(RequestPort):
         if self._port is None:
             self._port = opened_port(self.url, self._settings, self.subject, self.closing)
             have_terminal_check(self._port, self._settings)
-            self.open_count += 1
+            self._opened()
             self._silence_s, self._surplus, self._last_frame, self._careful = 0.0, b"", b"", 0
             self._empty_at = -inf
         return self.open_count
 
-    def exchange(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
-        """Send ``request``; the first complete frame after it.
-
-        After ``NoAnswer`` the next exchange waits until no late response can come.
-        """
+    def _exchange_once(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
+        """The first complete frame; after ``NoAnswer`` the next request waits for late responses."""
         if self._port is None:
             raise lost_port(self.subject, self.url, "it is not open")
         with self._port_errors():
@@ -106,10 +102,6 @@ class SerialPort(RequestPort):
             if not self._port.in_waiting:
                 self._empty_at = self.now()
             self.log.add(self._read(self._port), self._empty_at)
-
-    def now(self) -> float:
-        """The time, s, by which the frames in ``log`` are dated."""
-        return time.monotonic()
 
     def require_silence(self) -> None:
         """Wait for a short silence of the line before the next request."""
@@ -177,7 +169,7 @@ class SerialPort(RequestPort):
                 self._last_frame, self._surplus = cut
                 return self._last_frame
         self._silence_s = self.worst_latency_s
-        raise NoAnswer(received)
+        raise NoAnswer(received, request)
 
     def _read(self, port: serial.Serial) -> bytes:
         """The bytes that come within one slice, possibly none."""
@@ -194,7 +186,7 @@ class SerialPort(RequestPort):
         self.require_not_closed()
         request = request if self._parity is None else self._parity.encode(request)
         self._record(TrafficDirection.SENT, request)
-        self._asked_at = self._last_traffic = time.monotonic()
+        self._last_traffic = self._asked_at
         sent(port.write, request)
 
     @contextmanager

@@ -2,10 +2,13 @@
 
 import re
 import threading
+import time
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import inf
+from typing import Any
 
 from drivers.errors import PortLost
 from drivers.wire_trace import LineRecord, TraceRecorder, TrafficDirection
@@ -54,20 +57,32 @@ class StreamedFrame:
 class FrameLog:
     """The latest frames. Bytes that nobody read for a while are as old as the last look at the line.
 
-    A frame that comes twice at once is one: a copy confirms nothing. ``count`` is how many there were.
+    A frame that comes twice at once is one: a copy confirms nothing.
+
+    Args:
+        end: what ends a frame; by default any line end.
+
+    Attributes:
+        count: how many frames there were.
+        latest: the bytes that came last, whole frames or not.
+        pieces: how often bytes came.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, end: bytes | None = None) -> None:
         self.count = 0
+        self._end = LINE_END if end is None else re.compile(re.escape(end) + rb"[\r\n\0]*")
         self._frames: deque[StreamedFrame] = deque(maxlen=LOG_LENGTH)
         self._begun = b""
         self._begun_after_s = 0.0
+        self.latest, self.pieces = b"", 0
 
     def add(self, data: bytes, came_after_s: float) -> None:
         """Take bytes that were read together, all of which came after a time."""
+        if data:
+            self.latest, self.pieces = (self.latest + data)[-FRAME_LIMIT:], self.pieces + 1
         if not self._begun:
             self._begun_after_s = came_after_s
-        *lines, begun = LINE_END.split(self._begun + data)
+        *lines, begun = self._end.split(self._begun + data)
         before = b""
         for line in lines:
             if line and line != before:
@@ -87,14 +102,22 @@ WORST_LATENCY_S = 2.0
 
 
 class NoAnswer(Exception):
-    """No complete frame in time; ``received`` is what came, the echo of the request included.
+    """No complete frame in time. Never shown to users.
 
-    Never shown to users.
+    Attributes:
+        received: what came, the echo of ``request`` included.
+        beside_echo: what came beside that.
     """
 
-    def __init__(self, received: bytes) -> None:
+    def __init__(self, received: bytes, request: bytes) -> None:
         self.received = received
+        self.beside_echo = received.replace(request, b"") if request else received
         super().__init__(received)
+
+    @property
+    def is_echoed(self) -> bool:
+        """Whether the request came back."""
+        return self.beside_echo != self.received
 
 
 @dataclass(eq=False)
@@ -103,7 +126,8 @@ class RequestPort(ABC):
 
     Attributes:
         url: the line, as the cell file names it.
-        settings: of the line, from the cell file and the protocol.
+        settings: of the line, from the cell file and the protocol. Beside those of pyserial: ``settle_s``,
+            how long a device may restart and hear nothing after the line was opened.
         closing: set by another thread to interrupt every wait.
         recorder: gets all bytes.
         worst_latency_s: how long nothing is asked after a time-out, s.
@@ -122,11 +146,14 @@ class RequestPort(ABC):
     open_count: int = 0
     surplus_count: int = 0
     _must_clear: bool = False
+    _has_answered: bool = False
 
     def __post_init__(self) -> None:
         self.subject = f"port {self.url}"
         self.unsolicited: deque[bytes] = deque(maxlen=64)
-        self._settings = dict(self.settings)
+        self._settings: dict[str, Any] = dict(self.settings)
+        self._settle_s = float(self._settings.pop("settle_s", 0.0))
+        self._settled_s = self._asked_at = -inf
         self._wire = LineRecord(self.url, self.recorder)
 
     @abstractmethod
@@ -139,14 +166,43 @@ class RequestPort(ABC):
             FileError: the URL or a setting is refused.
         """
 
-    @abstractmethod
     def exchange(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
         """Send ``request``; the first complete frame after it, up to ``terminator``.
+
+        Opening a port restarts many a microcontroller (by DTR), and what it is sent meanwhile is lost. So
+        what was asked within ``settle_s`` after the opening is asked again, until something is answered.
 
         Raises:
             NoAnswer: no complete frame within ``timeout_s``.
             DeviceError: the line is not open, was lost or is being closed, or does not become silent.
         """
+        while True:
+            try:
+                frame = self._exchange_once(request, terminator, timeout_s)
+            except NoAnswer:
+                if self._has_answered or self._asked_at >= self._settled_s:
+                    raise
+            else:
+                self._has_answered = True
+                return frame
+
+    @abstractmethod
+    def _exchange_once(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
+        """Ask once; raises as ``exchange``."""
+
+    def now(self) -> float:
+        """The time, s, by which frames are dated."""
+        return time.monotonic()
+
+    def settles_for_s(self) -> float:
+        """How long, s, the device may still be restarting because the line was opened."""
+        return max(0.0, self._settled_s - self.now())
+
+    def _opened(self) -> None:
+        """The line was opened now."""
+        self.open_count += 1
+        self._has_answered = False
+        self._settled_s = self.now() + self._settle_s
 
     @abstractmethod
     def close(self) -> None:
@@ -162,4 +218,6 @@ class RequestPort(ABC):
             raise PortLost(f"port {self.url} is closed", subject=self.subject)
 
     def _record(self, direction: TrafficDirection, data: bytes) -> None:
+        if direction is TrafficDirection.SENT:
+            self._asked_at = self.now()
         self._wire.add(direction, data)

@@ -11,6 +11,9 @@ from drivers.wire_trace import TraceRecorder
 from drivers.worker_thread import Result, WorkerThread
 from hexacell.errors import FileError
 
+RECENT_S = 10.0
+"""An answer that came within this time, s, shows that the line is sound."""
+
 
 class SharedSerialPort:
     """A serial port used by one thread, on behalf of any coroutine of one event loop.
@@ -34,6 +37,7 @@ class SharedSerialPort:
         self.url = url
         self._settings = settings
         self._channels: dict[str, int | None] = {}
+        self._answered_s: dict[str, float] = {}
         self._worker = WorkerThread(f"serial {url}")
         self.line = factory(url, settings, self._worker.closing, trace, worst_latency_s)
 
@@ -63,6 +67,15 @@ class SharedSerialPort:
         if self._channels:
             self._name_subject()
         return bool(self._channels)
+
+    def note_answer(self, gauge: str) -> None:
+        """Keep in mind that ``gauge`` answers."""
+        self._answered_s[gauge] = self.line.now()
+
+    def answering_beside(self, gauge: str) -> str:
+        """Another gauge on this line that answered a moment ago; empty if none did."""
+        since_s = self.line.now() - RECENT_S
+        return next((name for name, at in self._answered_s.items() if name != gauge and at > since_s), "")
 
     async def open(self) -> int:
         """Open the port unless it is open and usable; how often it has been opened."""

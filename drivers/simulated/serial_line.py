@@ -3,7 +3,8 @@
 One thread receives, what comes on the descriptors that are ready, possibly nothing; ``send`` may be
 called from another one, and what a full buffer does not take in time is lost, as on a cable. ``url`` is
 what ``serial.serial_for_url`` opens, the same after unplugging and plugging in again. ``connections`` is
-how many clients have connected; 0 where a connection cannot be noticed.
+how many clients have connected; 0 where a connection cannot be noticed. ``openings`` is how often a client
+has opened it, at another speed than 38400 baud where it is a pseudo-terminal.
 """
 
 import fcntl
@@ -33,6 +34,7 @@ class PtyLine:
         self._folder = TemporaryDirectory(prefix="hexacell-")
         self._link = Path(self._folder.name) / NOT_IN_FILE_NAMES.sub("-", name)
         self._master = self._slave = -1
+        self.openings = 0
         self.plug_in()
 
     @property
@@ -66,6 +68,7 @@ class PtyLine:
             return b""
         packet = os.read(self._master, CHUNK)
         if packet[:1] != b"\0":
+            self.openings += termios.tcgetattr(self._slave)[4] != termios.B38400
             self._reset_speed()
         return packet[1:] if packet[:1] == b"\0" else b""
 
@@ -99,6 +102,10 @@ class SocketLine:
         self._plugged = False
         self.connections = 0
         self.plug_in()
+
+    @property
+    def openings(self) -> int:
+        return self.connections
 
     @property
     def url(self) -> str:

@@ -8,8 +8,11 @@ from pydantic import Field, model_validator
 from hexacell.cell.fields import NotNegative, Positive, Section, SerialPortName, Six, Text, broken_rule, key
 
 NUMBER = re.compile(  # a number as instruments send it
-    r"[+-]?\d+(\.\d*)?"
+    r"[+-]?(\d+\.?\d*|\.\d+)([Ee][+-]?\d{1,2})?"
 )
+
+BOOT_S = 2.5
+"""Longest restart of usual microcontrollers, from the opening of their port to the first line they hear."""
 
 DESCRIBED_GAUGES = frozenset({"request", "stream", "visa", "modbus"})
 """Protocols of gauges that a section of the cell file describes, of the same name."""
@@ -41,13 +44,18 @@ class DescribedFrame(Section):
                 re.compile(pattern)
             except re.error as error:
                 raise broken_rule(f"{pattern!r} is no regular expression: {error}", "Correct it") from error
-        match = re.fullmatch(self.answer, self.example.strip("\r\n"))
+        match = re.fullmatch(self.answer, self.bare_example)
         number = match[self.number_group] if match is not None and match.groups() else None
         if not NUMBER.fullmatch((number or "").replace(" ", "")):
             raise broken_rule(
                 "the example is no answer with a number in group 1", "Correct answer or example"
             )
         return self
+
+    @property
+    def bare_example(self) -> str:
+        """The example without what ends it."""
+        return self.example.strip("\r\n")
 
     @property
     def number_group(self) -> str | int:
@@ -59,7 +67,7 @@ class RequestSettings(DescribedFrame):
     """What a gauge of protocol ``request`` is asked, and what it answers."""
 
     ask: Wire = key(..., "text that is sent to ask for a value")
-    ends_with: Wire = key("\r", "first character of an answer's line end")
+    ends_with: Wire = key("\r", "first character of an answer's line end; `ask` has that of the question")
 
 
 class StreamSettings(DescribedFrame):
@@ -68,9 +76,16 @@ class StreamSettings(DescribedFrame):
     Of several gauges on one port the pattern has a group ``channel``, which is that of the gauge.
     """
 
+    ends_with: Wire | None = key(None, "what ends each value; by default any line end")
+
+    @property
+    def bare_example(self) -> str:
+        """The example without what ends it."""
+        return super().bare_example.removesuffix(self.ends_with or "")
+
     @model_validator(mode="after")
     def _its_groups_are_told_apart(self) -> Self:
-        match = re.fullmatch(self.answer, self.example.strip("\r\n"))
+        match = re.fullmatch(self.answer, self.bare_example)
         if match is None or not self.has_channel:
             return self
         if self.number_group != "number" or not (match["channel"] or "").isdecimal():
@@ -101,6 +116,8 @@ class VisaSettings(Section):
     expect: dict[Text, Text] = key(
         {}, 'answers that queries of its settings must get: { "UNIT:LENG?" = "M" }', max_length=20
     )
+    line_end: Wire = key("\n", 'end of every query: "\\r\\n" or "\\r" for some')
+    ends_with: Wire = key("\n", "last character of every answer")
     identify: bool = key(True, "whether the instrument is asked *IDN?")
     backend: Text = key("@py", "backend of PyVISA: @py is pure Python, @ivi the library of a maker")
 
@@ -158,6 +175,7 @@ class ModbusEncoderSettings(RegisterSettings):
         (1, 1, 1, 1, 1, 1), "addresses of the devices with legs 1 to 6; one device may have several legs"
     )
     registers: Six[Register] = key(..., "first register of the position of legs 1 to 6, counted from 0")
+    settle_s: NotNegative = key(BOOT_S, "how long devices may restart after the port was opened, s")
     bits: Literal[16, 32] = key(32, "bits of a position, in one or two registers")
     latch: LatchSettings | None = key(
         None, "register that samples several devices at one instant, where they have one"

@@ -8,6 +8,7 @@ from pydantic import Field, field_validator, model_validator
 
 from hexacell.addresses import require_serial_port
 from hexacell.cell.described_devices import (
+    BOOT_S,
     DbcSettings,
     ModbusEncoderSettings,
     ModbusSettings,
@@ -81,6 +82,10 @@ class GaugeSettings(Section):
     serial: dict[str, Any] = key({}, "settings for pyserial in place of the protocol's defaults")
     channel: int = key(1, "input of a multiplexer, from 1; the four digits of a U-WAVE", ge=0, le=9999)
     timeout_s: Positive = key(0.5, "longest wait for an answer, s")
+    settle_s: NotNegative = key(
+        BOOT_S,
+        "how long a device may restart and hear nothing after its port was opened, s: it is asked again",
+    )
     delay_s: NotNegative | None = key(
         None,
         "how old a value may be when it comes from a gauge that sends unasked, s; by default 0.5 for "
@@ -88,7 +93,7 @@ class GaugeSettings(Section):
     )
     travel_mm: Positive = key(12.5, "measuring range of the instrument, mm")
     resolution_mm: Positive | None = key(
-        None, "last digit of the gauge's display, mm; a display with other decimals is set to inches"
+        None, "last digit of the gauge's display, mm; one with others, but for zeros, is not set to mm"
     )
     agreement_mm: Positive | None = key(
         None,

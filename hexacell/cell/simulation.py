@@ -62,6 +62,9 @@ class SimulatedGauges(Section):
     noise_mm: NotNegative = key(0.01, "noise drawn at every stop of the robot, mm, 1 sigma")
     flicker_mm: NotNegative = key(0.001, "noise drawn at every reading, mm, 1 sigma")
     latency_s: NotNegative = key(0.02, "time between request and answer, s")
+    restart_s: NotNegative = key(
+        0.0, "how long they hear and send nothing after their port was opened, s of real time"
+    )
     baudrate: int | None = key(
         None, "speed of the line, baud; by default the protocol's", ge=300, le=10_000_000
     )

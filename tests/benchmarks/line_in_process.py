@@ -149,7 +149,7 @@ class InstrumentLine:
         self._require_plugged()
         command = request.rstrip(b"\r\n")
         due_s = self._time.monotonic() + self.faults.delay_s()
-        answer = self.faults.sent(command, self._instrument.answer(command))
+        answer = self.faults.sent(command + self._instrument.command_end, self._instrument.answer(command))
         for character in self._damage.of(self._with_parity(b"" if self.silent else answer)):
             self._coming += [(due_s, byte) for byte in self._received(character)]
 

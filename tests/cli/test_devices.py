@@ -58,7 +58,7 @@ def search_timeouts(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Has the search wait for so long."""
 
     def wait(**seconds: float) -> None:
-        limited = partial(search_devices, timeouts=SearchTimeouts(**seconds))
+        limited = partial(search_devices, timeouts=SearchTimeouts(**{"restart": 0.0} | seconds))
         monkeypatch.setattr("hexacell.cli.commands.devices.search_devices", limited)
 
     return wait

@@ -41,6 +41,7 @@ class ModbusScales(Instrument):
 
     baudrate: ClassVar[int] = 19200
     bits_a_byte: ClassVar[int] = 11
+    command_end: ClassVar[bytes] = b""
 
     def __init__(self, described: ModbusEncoderSettings, counts: Counts, *, has_gaps: bool = True) -> None:
         super().__init__({})

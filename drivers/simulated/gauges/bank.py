@@ -120,6 +120,7 @@ class SimulatedGaugeBank(ServedGroup):
             PtyLine(name) if self._settings.transport == "pty" else SocketLine(),
             self._clock,
             latency_s=self._settings.latency_s,
+            restart_s=self._settings.restart_s,
             baudrate=self._settings.baudrate,
             faults=LineFaults(LATE_TIMEOUTS * first.timeout_s),
         )

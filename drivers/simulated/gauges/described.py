@@ -53,10 +53,12 @@ class Streaming(Instrument):
     def __init__(self, indicators: Mapping[int, Indicator], described: StreamSettings) -> None:
         super().__init__(indicators)
         self._template = _Template(described)
+        end = described.ends_with or ""
+        self._end = b"" if described.example.endswith(end) else end.encode("latin-1")
 
     def _value(self, channel: int) -> bytes:
         shown = self.indicators[channel].shown()
-        return self.at_end if shown is None else self._template.filled(shown, channel)
+        return self.at_end if shown is None else self._template.filled(shown, channel) + self._end
 
 
 class Scpi(Instrument):
@@ -67,11 +69,15 @@ class Scpi(Instrument):
 
     def __init__(self, indicators: Mapping[int, Indicator], settings: VisaSettings) -> None:
         super().__init__(indicators)
-        self._settings = settings
+        self._settings, self._end = settings, settings.ends_with.encode("latin-1")
+        self.command_end = settings.line_end.encode("latin-1")  # type: ignore[misc]
         self._values = {settings.question(channel): channel for channel in self.indicators}
 
     def answer(self, command: bytes) -> bytes:
         """A value, a setting, or its name; nothing to what it does not know."""
+        return self._answer(command).replace(b"\n", self._end)
+
+    def _answer(self, command: bytes) -> bytes:
         asked = command.decode("latin-1")
         indicator = self.indicators[self._values.get(asked, min(self.indicators))]
         if not indicator.powered:
@@ -100,7 +106,7 @@ class _Template:
     """The example of a frame, whose number and channel are others."""
 
     def __init__(self, described: DescribedFrame) -> None:
-        match = re.fullmatch(described.answer, described.example.strip("\r\n"))
+        match = re.fullmatch(described.answer, described.bare_example)
         if match is None:
             raise ValueError(described.example)
         self._example, self._mm_per_unit = described.example, described.mm_per_unit
@@ -110,8 +116,9 @@ class _Template:
     def filled(self, mm: float, channel: int) -> bytes:
         """The frame of a value."""
         shown = self._example[slice(*self._number)]
-        decimals = len(shown.partition(".")[2])
-        parts = [(self._number, f"{mm / self._mm_per_unit:+0{len(shown)}.{decimals}f}")]
+        mantissa, exponent, _ = shown.upper().partition("E")
+        decimals = len(mantissa.partition(".")[2])
+        parts = [(self._number, f"{mm / self._mm_per_unit:+0{len(shown)}.{decimals}{exponent or 'f'}}")]
         if self._channel is not None:
             width = self._channel[1] - self._channel[0]
             parts.append((self._channel, f"{channel:0{width}d}"))
@@ -162,6 +169,7 @@ class Modbus(Instrument):
     baudrate: ClassVar[int] = 19200
     bits_a_byte: ClassVar[int] = 11
     has_channels: ClassVar[bool] = True
+    command_end: ClassVar[bytes] = b""
 
     def __init__(self, indicators: Mapping[int, Indicator], settings: ModbusSettings) -> None:
         super().__init__(indicators)

@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from enum import StrEnum
+from time import monotonic
 
 import numpy as np
 
@@ -74,7 +75,7 @@ class LineFaults:
             LineFault.CUT_SHORT: lambda sent: sent if is_whole else sent[: len(sent) // 2],
             LineFault.REPEATED: lambda sent: sent + unchanged,
             LineFault.UNASKED: lambda sent: before + sent,
-            LineFault.ECHOING: lambda sent: command + b"\r" + sent,
+            LineFault.ECHOING: lambda sent: command + sent,
             LineFault.NUL_BYTES: lambda sent: NULS + sent,
         }
         for fault, change in changes.items():
@@ -96,7 +97,8 @@ class GaugeLineServer(Closeable):
 
     An answer is sent after ``latency_s`` plus the transmission time of request and answer, in seconds
     of the cell's clock. Answers are sent one after another, as on a cable.
-    An instrument with a period sends by itself.
+    An instrument with a period sends by itself. One that restarts when its port is opened hears and
+    sends nothing for ``restart_s``.
     """
 
     def __init__(
@@ -106,6 +108,7 @@ class GaugeLineServer(Closeable):
         clock: CellClock,
         *,
         latency_s: float,
+        restart_s: float = 0.0,
         baudrate: int | None = None,
         faults: LineFaults | None = None,
     ) -> None:
@@ -118,6 +121,7 @@ class GaugeLineServer(Closeable):
         self._latency_s = latency_s
         self._byte_s = instrument.bits_a_byte / (baudrate or instrument.baudrate)
         self._silent = False
+        self._restart_s, self._openings, self._restarted_s = restart_s, line.openings, 0.0
         self._received = b""
         self._answers: deque[tuple[float, bytes]] = deque()
         self._jobs: queue.SimpleQueue[tuple[Callable[[], None], Future[None]]] = queue.SimpleQueue()
@@ -182,13 +186,21 @@ class GaugeLineServer(Closeable):
             os.read(self._wake_read, COMMAND_LIMIT)
             self._do_jobs()
         else:
-            commands, rest = self.instrument.split(self._received + self._line.receive(ready))
+            received = self._line.receive(ready)
+            if self._line.openings != self._openings:
+                self._openings, self._restarted_s = self._line.openings, monotonic() + self._restart_s
+            if self._is_restarting():
+                received = self._received = b""
+            commands, rest = self.instrument.split(self._received + received)
             self._received = rest[-COMMAND_LIMIT:]
             for command in commands:
                 self._answer(command)
         self._prepare_unasked()
         while self._answers and self._answers[0][0] <= self._clock.now():
             self._line.send(self._answers.popleft()[1])
+
+    def _is_restarting(self) -> bool:
+        return monotonic() < self._restarted_s
 
     def _do_jobs(self) -> None:
         while not self._jobs.empty():
@@ -205,7 +217,7 @@ class GaugeLineServer(Closeable):
         if self._silent:
             answer = b""
         late_s = self.faults.delay_s() / self._clock.real_seconds(1.0)
-        answer = self.faults.sent(command, answer)
+        answer = self.faults.sent(command + self.instrument.command_end, answer)
         wire_s = (len(command) + len(self.instrument.command_end) + len(answer)) * self._byte_s
         free_at = max([self._clock.now(), *(due for due, _ in self._answers)])
         self._answers.append((free_at + self._latency_s + late_s + wire_s, answer))
@@ -221,7 +233,7 @@ class GaugeLineServer(Closeable):
             self._next_unasked = now + late_s / scale
             return
         self._next_unasked = now + max(period_s, SHORTEST_PERIOD_S / scale)
-        for frame in () if self._silent else self.instrument.unasked():
+        for frame in () if self._silent or self._is_restarting() else self.instrument.unasked():
             sent = self.faults.sent(b"", frame)
             self._answers.append((now + len(sent) * self._byte_s, sent))
 

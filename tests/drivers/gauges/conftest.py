@@ -86,7 +86,7 @@ def settings():
     """Settings of a gauge, by its protocol."""
 
     def make(protocol, name="y", **changes):
-        given = {"axis": "y", "port": "wire", "timeout_s": TIMEOUT_S, **changes}
+        given = {"axis": "y", "port": "wire", "timeout_s": TIMEOUT_S, "settle_s": 0.0, **changes}
         return GaugeSettings(name=name, protocol=protocol, **given)
 
     return make

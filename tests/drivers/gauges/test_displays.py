@@ -42,6 +42,7 @@ VALUES = [
     (DIGIMATIC, 1, b"-1.234\n", -1.234),
     (DIGIMATIC, 1, b"12.34\r\n", 12.34),
     (DIGIMATIC, 1, b"1.234000\n", 1.234),  # open firmware always sends six decimals
+    (DIGIMATIC, 1, b"-1.23400\n", -1.234),  # and some five: decimals are no unit
 ]
 
 FAULTS = [
@@ -57,7 +58,7 @@ FAULTS = [
     (KEYENCE, 1, b"ER,M0,29\r\n", DeviceError, "gauge y: reports error 29 instead of its value"),
     (KEYENCE, 1, b"M0,+01.2345\r\n", WrongAnswer, "where protocol keyence-dl-rs1a has answers like"),
     (DIGIMATIC, 1, b"# timeout\n", DeviceError, "gauge y: its adapter reports: timeout"),
-    (DIGIMATIC, 1, b"0.12345\n", WrongSetting, "gauge y: answers in inch"),
+    (DIGIMATIC, 1, b"0.12345\n", WrongSetting, "gauge y: shows 5 decimals .* in/mm key"),
     (DIGIMATIC, 1, b"hello\n", WrongAnswer, "where protocol digimatic-usb has answers like"),
 ]
 
@@ -86,6 +87,39 @@ async def test_what_is_no_value_is_told(
     with pytest.raises(error, match=message):
         await gauge.read()
     dialogue.expected.clear()
+
+
+@pytest.mark.parametrize("resolution", [None, 0.001])
+@pytest.mark.parametrize("end", ["00", "000"])
+async def test_zeros_behind_the_resolution_are_no_other_unit(dialogue, links, settings, resolution, end):
+    gauge = DigimaticUsbGauge(settings("digimatic-usb", resolution_mm=resolution), links)
+    dialogue.expect(*[(b"\n", f"-1.234{end}\n".encode())] * (3 if resolution is None else 4))
+    await gauge.open()
+    assert (await gauge.read()).value_mm == -1.234
+
+
+@pytest.mark.parametrize("frame", [b"-0.048583\n", b"-0.04858\n", b"-1.23\n"])
+async def test_digits_behind_the_resolution_are_another_display(dialogue, links, settings, frame):
+    gauge = DigimaticUsbGauge(settings("digimatic-usb", resolution_mm=0.001), links)
+    dialogue.expect(*[(b"\n", frame)] * 3)
+    with pytest.raises(WrongSetting, match=r"its resolution of 0\.001 mm has 3\. Press its in/mm key, or"):
+        await gauge.open()
+
+
+@pytest.mark.parametrize(("gauge_of", "channel"), [(ID_H, 7), ((Mux10Gauge, "mux10", b"2\r"), 2)])
+async def test_the_protocol_says_how_inches_look_and_the_cell_file_overrules_it(
+    dialogue, links, settings, gauge_of, channel
+):
+    factory, protocol, request = gauge_of
+    frame = b"GN07,+000.63956\r\n" if protocol == "mitutoyo-id-h" else b"02A+00.63956\r"
+    dialogue.expect((request, frame))
+    with pytest.raises(WrongSetting, match="gauge y: answers in inch"):
+        await factory(settings(protocol, channel=channel), links).open()
+    gauge = factory(settings(protocol, channel=channel, resolution_mm=1e-5), links)
+    dialogue.expect((request, frame), *[(b"V\r", b"MUX-10F\r")] * (protocol == "mux10"))
+    dialogue.expect(*[(request, frame)] * 3)
+    await gauge.open()
+    assert (await gauge.read()).value_mm == 0.63956
 
 
 async def test_the_line_of_a_display_has_seven_bits_and_a_parity(dialogue, links, settings):

@@ -78,7 +78,7 @@ async def test_another_instrument_voids_the_zero():
         (b"-9.90000000E+37\n", GaugeAtEnd, "gauge x: is out of its range"),
         (b"9.91E37\n", DeviceError, "gauge x: has no value"),
         (b'-113,"Undefined header"\n', WrongAnswer, "where protocol visa has answers like"),
-        (b"+1.0E-03", WrongAnswer, "where protocol visa has answers like"),
+        (b"+1.0E-03", WrongAnswer, "ends with nothing, where LF is expected"),
         (b"", GaugeSilent, "gauge x: does not answer within 0.5 s"),
     ],
 )

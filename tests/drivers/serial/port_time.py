@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from drivers.serial import port
+from drivers.serial import port, request_port
 
 SLICE_S = 0.005
 
@@ -29,3 +29,4 @@ class PortTime:
     def install(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """Make it the time of every serial port."""
         monkeypatch.setattr(port, "time", self)
+        monkeypatch.setattr(request_port, "time", self)

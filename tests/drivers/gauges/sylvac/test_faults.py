@@ -26,7 +26,7 @@ async def test_an_echo_without_an_answer_is_reported_as_silence(dialogue, gauge)
 async def test_even_parity_read_as_eight_bits_is_recognised(dialogue, gauge):
     with_parity = bytes(byte | (byte.bit_count() % 2) << 7 for byte in b"MM\r")
     dialogue.expect(*[(b"UNI?\r", with_parity)] * 3)
-    with pytest.raises(WrongAnswer, match=r"Check parity settings.*4800 baud 7E2"):
+    with pytest.raises(WrongAnswer, match=r"check parity settings.*4800 baud 7E2"):
         await gauge.open()
 
 

@@ -18,6 +18,7 @@ from hexacell.errors import DeviceError
 from hexacell.storage.atomic_files import os_error_to_file_error
 
 MAX_BYTES = 64
+SLOW = "State a longer timeout_s, or let no other program read"
 PLAUSIBLE_C = (-100.0, 300.0)
 
 _log = logging.getLogger(__name__)
@@ -52,17 +53,17 @@ class SysfsThermometer:
             DeviceError: the file gives none, or not in time.
         """
         if self._reading is not None and not self._reading.done():
-            raise self._error("still does not answer")
+            raise self._error("still does not answer", SLOW)
         self._thread = self._thread or ThreadPoolExecutor(1, thread_name_prefix="thermometer")
         self._reading = self._thread.submit(_content, self._path)
         try:
             async with asyncio.timeout(self._settings.timeout_s):
                 raw = await asyncio.shield(asyncio.wrap_future(self._reading))
         except TimeoutError:
-            raise self._error(f"does not answer within {self._settings.timeout_s:g} s") from None
+            raise self._error(f"does not answer within {self._settings.timeout_s:g} s", SLOW) from None
         except OSError as error:
             plain = os_error_to_file_error("cannot be read", self._path, error)
-            raise self._error(plain.problem) from error
+            raise self._error(plain.problem, "Connect it, or correct path") from error
         try:
             celsius = int(raw) / 1000
         except ValueError:
@@ -78,8 +79,8 @@ class SysfsThermometer:
         if thread is not None:
             thread.shutdown(wait=self._reading is None or self._reading.done(), cancel_futures=True)
 
-    def _error(self, problem: str) -> DeviceError:
-        return DeviceError(problem, subject=self._subject, action=f"Check the sensor behind {self._path}")
+    def _error(self, problem: str, check: str = "Check the sensor behind") -> DeviceError:
+        return DeviceError(problem, subject=self._subject, action=f"{check} {self._path}")
 
 
 def _content(path: Path) -> str:

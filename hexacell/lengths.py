@@ -4,13 +4,7 @@ Figures that belong together, as an error and its uncertainty, have one unit. An
 where they would be shown as zero. Files and documents for other programs are in mm and deg always.
 """
 
-import re
-from collections.abc import Sequence
 from dataclasses import dataclass
-
-_DECIMALS = re.compile(r"\.(\d+)")
-PADDED = 6
-"""Decimals of firmware that fills them up; no dial indicator shows so many in mm."""
 
 MM_PER_METRE = 1000.0
 
@@ -70,12 +64,3 @@ def from_to(before_mm: float, after_mm: float, decimals_before: int = 3) -> str:
     if unit_of(after_mm) is UM:
         return f"{shown(before_mm)} -> {shown(after_mm)}"
     return f"{before_mm:.{decimals_before}f} -> {after_mm:.3f} mm"
-
-
-def display_decimals(answers: Sequence[str]) -> int:
-    """The decimals that a display has by its answers; 0 without any.
-
-    Firmware that always sends six fills them up with zeros.
-    """
-    found = [match[1] for answer in answers if (match := _DECIMALS.search(answer))]
-    return max((len(one if len(one) < PADDED else one.rstrip("0")) for one in found), default=0)

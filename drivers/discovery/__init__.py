@@ -17,7 +17,7 @@ class SearchTimeouts:
         adapter: for a CAN adapter, and for the first node on a bus.
         node: for each further node on a bus.
         listen: to what devices send unasked.
-        restart: for those that restart because their port was opened, where nothing came.
+        restart: for devices that restart because their port was opened.
         controller: for the greeting of a controller.
     """
 

@@ -16,7 +16,6 @@ from drivers.serial.port import SerialPort
 from drivers.serial.received import SHOWN_BYTES, is_text, quoted
 from drivers.serial.request_port import FrameLog, NoAnswer
 from drivers.serial.shared_port import SharedSerialPorts
-from hexacell.cell.described_devices import BOOT_S
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError, HexacellError
 
@@ -80,7 +79,7 @@ async def search_port(
     That is a serial port, a pyserial URL, or a VISA resource, which is asked its name.
     """
     if VISA_SEPARATOR in port:
-        return await _identify(port, timeouts.visa)
+        return await _identify(port, timeouts)
     probes = {name: probe for name in factories if (probe := probe_of(factories[name])) is not None}
     asked = sorted(name for name, probe in probes.items() if probe.channel_of is None)
     last = sorted(asked, key=lambda name: probes[name].is_last)
@@ -89,7 +88,7 @@ async def search_port(
     heard: list[str] = []
     for protocol, baudrate in tries:
         settings = _settings(protocol, port, timeouts.gauge, baudrate)
-        settings = settings.model_copy(update={"settle_s": probes[protocol].settle_s})
+        settings = settings.model_copy(update={"settle_s": timeouts.restart * probes[protocol].restarts})
         try:
             found = await _channels(factories[protocol], settings, heard)
         except HexacellError as error:
@@ -107,14 +106,15 @@ def _settings(protocol: str, port: str, timeout_s: float, baudrate: int | None =
     )
 
 
-async def _identify(resource: str, timeout_s: float) -> PortFindings:
+async def _identify(resource: str, timeouts: SearchTimeouts) -> PortFindings:
     """The instrument at a VISA resource."""
+    settings = {"settle_s": timeouts.restart}
 
     def name() -> str:
         line, address = line_to(resource)
-        with closing(line(address, {"settle_s": BOOT_S}, threading.Event())) as port, suppress(NoAnswer):
+        with closing(line(address, settings, threading.Event())) as port, suppress(NoAnswer):
             port.open()
-            answer = port.exchange(IDENTIFY + VisaGauge.terminator, VisaGauge.terminator, timeout_s)
+            answer = port.exchange(IDENTIFY + VisaGauge.terminator, VisaGauge.terminator, timeouts.visa)
             return answer.decode("ascii", "replace").strip()
         return ""
 

@@ -4,7 +4,6 @@ import re
 
 from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, Probe, ProtocolSpec
 from drivers.gauges.serial_gauge import ValueOnlyGauge
-from hexacell.cell.described_devices import BOOT_S
 from hexacell.errors import DeviceError
 
 DIGIMATIC_VALUE = re.compile(rb"([+-]?)(\d{1,5}\.\d{1,6})\r?\n")
@@ -20,7 +19,7 @@ class DigimaticUsbGauge(ValueOnlyGauge):
     """
 
     spec = ProtocolSpec("digimatic-usb", "Digimatic by microcontroller", LineSettings(115200), "-1.234\n")
-    probe = Probe(settle_s=BOOT_S)
+    probe = Probe(restarts=True)
     value_request = b"\n"
     terminator = b"\n"
 

@@ -54,14 +54,14 @@ class Probe:
 
     Attributes:
         other_baud_rates: of instruments that come set to other rates than the protocol's usual one.
-        settle_s: how long devices of this protocol may restart because the port was opened.
+        restarts: whether devices of this protocol may restart because the port is opened.
         is_last: asked after all others, because instruments of other protocols mistake its question.
         channel_of: for gauges that send unasked: the channel whose value a frame is, None for other frames.
             The line is then listened to, and nothing is asked.
     """
 
     other_baud_rates: tuple[int, ...] = ()
-    settle_s: float = 0.0
+    restarts: bool = False
     is_last: bool = False
     channel_of: Callable[[bytes], int | None] | None = None
 

@@ -23,12 +23,11 @@ from drivers.gauges.protocol import (
 from drivers.interfaces import DeviceIdentity, GaugeReading
 from drivers.serial.opening import adapter_at
 from drivers.serial.port import SerialPort
-from drivers.serial.received import quoted, shape_of, what_is_wrong_with
+from drivers.serial.received import quoted, what_is_wrong_with
 from drivers.serial.request_port import NoAnswer, RequestPort
 from drivers.serial.shared_port import SharedSerialPort, SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
-from hexacell.errors import DeviceError, FileError, UsageError
-from hexacell.plugins import Group, load, names
+from hexacell.errors import DeviceError, FileError
 
 MAX_READINGS = 12  # enough for an oscillating ball to come to rest
 MAX_REQUESTS = 3
@@ -186,8 +185,8 @@ class SerialGauge(ABC):
         self._port.take_unsolicited()
 
     def _line_settings(self) -> dict[str, object]:
-        settle_s = self.settings.settle_s
-        return {**asdict(self.spec.line), **self.settings.serial, "settle_s": settle_s}
+        stated = {**self.settings.serial, "settle_s": self.settings.settle_s}
+        return {**asdict(self.spec.line), **stated}
 
     def _described(self, section: Stated | None, problem: str, example: str) -> Stated:
         """The section of the cell file that describes a gauge of this protocol."""
@@ -280,9 +279,7 @@ class SerialGauge(ABC):
         if found := what_is_wrong_with(received, self.terminator, usual):
             return self._error(WrongAnswer, f"{came}, {found[0]}", found[1])
         problem = f"{came} where protocol {protocol} has answers like {self.spec.example!r}"
-        action = f"Correct {self.answer_check} or port in the cell file"
-        if (alike := _protocols_like(received)) and protocol not in alike:
-            action = f"Correct protocol in the cell file: answers of {' and '.join(sorted(alike))} are such"
+        action = f"Correct {self.answer_check} or port in the cell file; `hexacell devices` tries all"
         return self._error(WrongAnswer, problem, action)
 
     async def _confirmed(self, state: GaugeState, before: GaugeState | None = None) -> GaugeState:
@@ -334,17 +331,6 @@ class SerialGauge(ABC):
         if self._port.line.open_count != self._session:
             raise self._voided("lost its port meanwhile")
         return self._port
-
-
-def _protocols_like(answer: bytes) -> set[str]:
-    """The protocols whose typical answer differs from an answer in its numbers alone."""
-    found, shape = set(), shape_of(answer)
-    for name in names(Group.GAUGES):
-        with suppress(UsageError):  # a package of somebody else that is broken
-            spec = getattr(load(Group.GAUGES, name), "spec", None)
-            if isinstance(spec, ProtocolSpec) and shape_of(spec.example.encode("latin-1")) == shape:
-                found.add(name)
-    return found
 
 
 class ValueOnlyGauge(SerialGauge):

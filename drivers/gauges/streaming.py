@@ -105,7 +105,7 @@ class StreamingGauge(ValueOnlyGauge):
             came = quoted(self._open_port().listened.log.latest[-SHOWN_BYTES:])
             return self._error(
                 WrongAnswer,
-                f"sends {pieces_s:.2g} a second, in another form: {came} came last, without a line end",
+                f"sends {pieces_s:.3g} a second, in another form: {came} came last, without a line end",
                 "Correct baud rate in serial, or answer and ends_with of protocol stream, in the cell file",
             )
         if Origin.ANOTHER_GAUGE in heard:

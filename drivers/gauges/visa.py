@@ -128,7 +128,7 @@ class VisaGauge(SerialGauge):
     spec = ProtocolSpec("visa", "instrument with SCPI", LineSettings(9600), "+1.23450000E-03\n")
     probe = None
     terminator = b"\n"
-    silence_check = "line_end, ends_with"
+    silence_check = "line_end"
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
         if settings.port is not None:
@@ -137,8 +137,8 @@ class VisaGauge(SerialGauge):
         super().__init__(settings, ports)
         self._visa = self._described(settings.visa, "does not say what is asked", "visa = { ask = ... }")
         self.channel = settings.channel if self._visa.has_channel else None
-        self.terminator = self._visa.ends_with.encode("latin-1")
         self._line_end = self._visa.line_end.encode("latin-1")
+        self.terminator = self._line_end[-1:]
         self.value_request = self._visa.question(settings.channel).encode("latin-1") + self._line_end
         self._decimals = decimals_of(settings.resolution_mm or 0.001)
 

@@ -40,6 +40,8 @@ _CAUSES = {
     errno.EPERM: _NOT_PERMITTED,
     errno.EBUSY: _IN_USE,
     errno.EAGAIN: _IN_USE,
+    errno.EIO: ("cannot be opened: it has no device behind it", _ABSENT[1]),
+    errno.ENOTTY: ("is no serial port, or has no control lines", "Correct port in the cell file"),
 }
 
 
@@ -113,6 +115,8 @@ def sent(write: Callable[[bytes], object], data: bytes) -> int:
 
 def lost_port(subject: str, url: str, reason: str, action: str = "Plug it in") -> PortLost:
     """The error for a port that was open, or should be."""
+    if "multiple access" in reason:  # pyserial's words
+        action += ", end any other program that reads it,"
     return PortLost(
         f"port {url} was lost ({reason})",
         subject=subject,
@@ -139,9 +143,10 @@ def opening_errors(subject: str, url: str) -> Iterator[None]:
             action="Correct port or serial in the cell file",
         ) from error
     except (OSError, termios.error) as error:
+        numbers = (*error.args[:1], *getattr(error.__context__, "args", ())[:1])
+        number = next((one for one in numbers if isinstance(one, int)), 0)
         problem, action = _CAUSES.get(
-            getattr(error, "errno", None) or 0,
-            (f"cannot be opened: {error}", "Check the device and port in the cell file"),
+            number, (f"cannot be opened: {error}", "Check the device and port in the cell file")
         )
         raise PortLost(f"port {url} {problem}", subject=subject, action=action) from error
 

@@ -21,11 +21,6 @@ def is_text(data: bytes) -> bool:
     return TEXT.fullmatch(data) is not None
 
 
-def shape_of(text: bytes) -> bytes:
-    """An answer without its numbers, blanks and line end: alike for all values of one protocol."""
-    return re.sub(rb"[+-]?\d+", b"0", re.sub(rb"\s", b"", text))
-
-
 def what_is_wrong_with(received: bytes, terminator: bytes, usual: str) -> tuple[str, str] | None:
     """What repeated answers show by their bytes alone, and what to do; None if that is nothing.
 

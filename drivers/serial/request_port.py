@@ -57,15 +57,8 @@ class StreamedFrame:
 class FrameLog:
     """The latest frames. Bytes that nobody read for a while are as old as the last look at the line.
 
-    A frame that comes twice at once is one: a copy confirms nothing.
-
-    Args:
-        end: what ends a frame; by default any line end.
-
-    Attributes:
-        count: how many frames there were.
-        latest: the bytes that came last, whole frames or not.
-        pieces: how often bytes came.
+    A frame ends with ``end``, by default any line end; one that comes twice at once is one: a copy confirms
+    nothing. ``count`` is how many there were, ``latest`` the last bytes, ``pieces`` how often some came.
     """
 
     def __init__(self, end: bytes | None = None) -> None:
@@ -102,11 +95,9 @@ WORST_LATENCY_S = 2.0
 
 
 class NoAnswer(Exception):
-    """No complete frame in time. Never shown to users.
+    """No complete frame in time; ``received`` is what came, ``beside_echo`` without the request's echo.
 
-    Attributes:
-        received: what came, the echo of ``request`` included.
-        beside_echo: what came beside that.
+    Never shown to users.
     """
 
     def __init__(self, received: bytes, request: bytes) -> None:
@@ -126,8 +117,8 @@ class RequestPort(ABC):
 
     Attributes:
         url: the line, as the cell file names it.
-        settings: of the line, from the cell file and the protocol. Beside those of pyserial: ``settle_s``,
-            how long a device may restart and hear nothing after the line was opened.
+        settings: of the line, from the cell file and the protocol; ``settle_s`` is how long a device may
+            restart and hear nothing after the line was opened.
         closing: set by another thread to interrupt every wait.
         recorder: gets all bytes.
         worst_latency_s: how long nothing is asked after a time-out, s.

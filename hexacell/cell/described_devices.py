@@ -116,8 +116,7 @@ class VisaSettings(Section):
     expect: dict[Text, Text] = key(
         {}, 'answers that queries of its settings must get: { "UNIT:LENG?" = "M" }', max_length=20
     )
-    line_end: Wire = key("\n", 'end of every query: "\\r\\n" or "\\r" for some')
-    ends_with: Wire = key("\n", "last character of every answer")
+    line_end: Wire = key("\n", "end of every query; its last character is that of every answer")
     identify: bool = key(True, "whether the instrument is asked *IDN?")
     backend: Text = key("@py", "backend of PyVISA: @py is pure Python, @ivi the library of a maker")
 

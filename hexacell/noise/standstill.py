@@ -10,6 +10,7 @@ Sources: Rosner, Technometrics 25 (1983) 165-172; JCGM 100, F.2.2.1.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,7 +18,6 @@ import numpy as np
 
 from hexacell.distributions import chi_square_limit, student_exceedance, student_limit
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.lengths import display_decimals
 
 SMALLEST_SERIES = 8
 """Fewer readings are no series."""
@@ -32,6 +32,9 @@ CORRELATION_SIGMAS = 2.33
 LARGEST_CORRELATION = 0.95
 USUAL_STEP_MM = 1e-3
 """Step of the display of a dial indicator."""
+
+PADDED = 6
+_DECIMALS = re.compile(r"\.(\d+)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,9 +87,13 @@ def reading_noise(values: Array, step_mm: float) -> ReadingNoise:
 
 
 def display_step(answers: Sequence[str]) -> float:
-    """The step of a display, mm, by the decimal digits of its answers; ``USUAL_STEP_MM`` without any."""
-    digits = display_decimals(answers)
-    return 10.0**-digits if digits else USUAL_STEP_MM
+    """The step of a display, mm, by the decimal digits of its answers; ``USUAL_STEP_MM`` without any.
+
+    Firmware that always sends six fills them up with zeros.
+    """
+    found = [digits[1] for answer in answers if (digits := _DECIMALS.search(answer))]
+    most = max((len(one if len(one) < PADDED else one.rstrip("0")) for one in found), default=0)
+    return 10.0**-most if most else USUAL_STEP_MM
 
 
 @dataclass(frozen=True, slots=True, eq=False)

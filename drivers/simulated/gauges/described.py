@@ -69,13 +69,13 @@ class Scpi(Instrument):
 
     def __init__(self, indicators: Mapping[int, Indicator], settings: VisaSettings) -> None:
         super().__init__(indicators)
-        self._settings, self._end = settings, settings.ends_with.encode("latin-1")
+        self._settings = settings
         self.command_end = settings.line_end.encode("latin-1")  # type: ignore[misc]
         self._values = {settings.question(channel): channel for channel in self.indicators}
 
     def answer(self, command: bytes) -> bytes:
         """A value, a setting, or its name; nothing to what it does not know."""
-        return self._answer(command).replace(b"\n", self._end)
+        return self._answer(command).replace(b"\n", self.command_end)
 
     def _answer(self, command: bytes) -> bytes:
         asked = command.decode("latin-1")

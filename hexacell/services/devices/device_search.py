@@ -20,7 +20,7 @@ from drivers.discovery.encoders import (
 from drivers.discovery.gauges import FoundGauge, PortFindings, probe_of, search_port
 from drivers.serial.opening import SerialPortFound, serial_ports
 from hexacell.kinematics.parameters import LEGS, JointUnit
-from hexacell.lengths import display_decimals
+from hexacell.noise.standstill import PADDED
 from hexacell.plugins import Group, load, names
 from hexacell.services.devices.first_cell import BITRATE, GAUGE_AXES, CellDraft, Document
 
@@ -101,10 +101,14 @@ def found_bank(found: SearchFindings) -> tuple[BusFindings, tuple[FoundNode, ...
 
 def gauge_keys(gauge: FoundGauge) -> Document:
     """What a gauge reported beside its address: its channel, its line and the last digit of its display."""
-    decimals = display_decimals([gauge.shown.rstrip("<=>, M")])
+    decimals = len(gauge.shown.rstrip("<=>, M").partition(".")[2])
     channel = {} if gauge.channel is None else {"channel": gauge.channel}
     line = {} if gauge.baudrate is None else {"serial": {"baudrate": gauge.baudrate}}
-    return {**channel, **line, **({"resolution_mm": round(10.0**-decimals, decimals)} if decimals else {})}
+    return {
+        **channel,
+        **line,
+        **({"resolution_mm": round(10.0**-decimals, decimals)} if 0 < decimals < PADDED else {}),
+    }
 
 
 def encoder_keys(nodes: tuple[FoundNode, ...]) -> Document:

@@ -10,7 +10,6 @@ from drivers.discovery.gauges import search_port
 from drivers.encoders.modbus import ModbusBank
 from drivers.errors import GaugeSilent
 from drivers.gauges.digimatic_usb import DigimaticUsbGauge
-from drivers.gauges.protocol import Probe
 from drivers.serial.modbus_port import ModbusPort
 from hexacell.cell.devices import GaugeSettings, LinearEncoderSettings
 from hexacell.plugins import Group, load
@@ -59,13 +58,12 @@ async def test_its_control_lines_are_those_of_the_cell_file(dialogue, links, set
     assert (dialogue.dtr, dialogue.rts) == (False, False)
 
 
-async def test_a_search_gives_microcontrollers_their_time(monkeypatch):
-    monkeypatch.setattr(DigimaticUsbGauge, "probe", Probe(settle_s=1.0))
+async def test_a_search_gives_microcontrollers_their_time():
     async with cell(["digimatic-usb"] * 3, restart_s=RESTART_S) as made:
         port = made.rack.gauges[0].port
         names = ("cdi", "digimatic-usb")
         found = await search_port(
-            port, {name: load(Group.GAUGES, name) for name in names}, SearchTimeouts(gauge=0.1)
+            port, {name: load(Group.GAUGES, name) for name in names}, SearchTimeouts(gauge=0.1, restart=1.0)
         )
     assert [gauge.protocol for gauge in found.gauges] == ["digimatic-usb"]
 

@@ -74,6 +74,7 @@ Row = tuple[str, str, str, str]
 def plain(error: HexacellError) -> str:
     """A message without what differs from run to run."""
     words = re.sub(r"ASRL\S+::INSTR", "PORT", str(error))
+    words = re.sub(r"b'[^']*' came last", "FRAME came last", words)
     words = re.sub(r"b'[^']*\\x[^']*'", "BYTES", words)
     words = re.sub(r"(?<!\w)/[\w/.-]*\w", "PORT", words)
     words = re.sub(r" in \S+ s;", " in # s;", words)

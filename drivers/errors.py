@@ -11,6 +11,7 @@ from typing import Any, TypeVar, cast
 
 from drivers.interfaces import StartupAction
 from hexacell.errors import DeviceError, HexacellError, UsageError
+from hexacell.plugins import plugin_failure
 
 
 class PortLost(DeviceError):
@@ -168,7 +169,7 @@ Device = TypeVar("Device")
 def translated(device: Device, subject: str) -> Device:
     """The device, whose coroutines raise a ``DeviceError`` where a library or the system failed.
 
-    An error of any other kind is a fault of the driver, and stays what it is.
+    An error of any other kind is a fault of the driver; one of a plug-in names its package.
     """
     return cast("Device", _Translated(device, subject))
 
@@ -197,6 +198,8 @@ class _Translated:
             except Exception as error:
                 library = type(error).__module__.partition(".")[0]
                 if not isinstance(error, OSError | EOFError) and library not in LIBRARIES:
+                    if (failed := plugin_failure(error)) is not None:
+                        raise failed from error
                     raise
                 raise DeviceError(
                     f"its driver failed: {type(error).__name__}: {error}",

@@ -2,17 +2,25 @@
 
 import logging
 import sys
-from collections.abc import Callable, Sequence
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from enum import Enum
 from functools import lru_cache
-from importlib.metadata import EntryPoint, EntryPoints, entry_points
+from importlib.metadata import Distribution, EntryPoint, EntryPoints, entry_points
 from typing import Any
 
-from hexacell.errors import UsageError, did_you_mean
+from hexacell.errors import DeviceError, HexacellError, UsageError, did_you_mean
 
 _log = logging.getLogger(__name__)
 
 Factory = Callable[..., Any]
+OWN = "hexacell"
+"""The package of this program, whose errors are its own."""
+
+
+class PluginFailed(DeviceError):
+    """A plug-in of another package raised what only a fault of it can be; ``subject`` is the package."""
 
 
 class Group(Enum):
@@ -52,6 +60,69 @@ def load(group: Group, name: str) -> Factory:
         raise _broken(group, point, f"{factory!r} is not callable")
     _log.debug("%s '%s' is %s", group.noun, name, point.value)
     return factory
+
+
+def created(group: Group, name: str, *arguments: object, **named: object) -> Any:  # noqa: ANN401
+    """What the class or factory that is announced as ``name`` in ``group`` makes of the arguments.
+
+    Raises:
+        UsageError: as :func:`load` does.
+        PluginFailed: it takes no such arguments, or fails.
+    """
+    factory = load(group, name)
+    with plugin_failures_named():
+        try:
+            return factory(*arguments, **named)
+        except TypeError as error:  # perhaps in the call itself, of which nothing of the plug-in is a part
+            package = _only(group, name).dist
+            if package is None or package.name == OWN:
+                raise
+            raise _failed(package, getattr(factory, "__qualname__", name), error) from error
+
+
+@contextmanager
+def plugin_failures_named() -> Iterator[None]:
+    """Convert whatever a plug-in of another package raises, within this context or decorated function.
+
+    Raises:
+        PluginFailed: with the package, its version and the method that was called.
+    """
+    try:
+        yield
+    except HexacellError:
+        raise
+    except Exception as error:
+        if (failed := plugin_failure(error)) is None:
+            raise
+        raise failed from error
+
+
+def plugin_failure(error: BaseException) -> PluginFailed | None:
+    """An error as that of the plug-in it came through; None if it came through none of another package."""
+    packages = _foreign(tuple(sys.path))
+    for frame, _ in traceback.walk_tb(error.__traceback__):
+        module = str(frame.f_globals.get("__name__"))
+        if (package := packages.get(module.partition(".")[0])) is not None:
+            return _failed(package, f"{module}.{frame.f_code.co_qualname}", error)
+    return None if error.__cause__ is None else plugin_failure(error.__cause__)
+
+
+def _failed(package: Distribution, method: str, error: BaseException) -> PluginFailed:
+    _log.info("%s failed in %s", package.name, method, exc_info=error)
+    words = " ".join(f"{type(error).__name__}: {error}".split())
+    return PluginFailed(
+        f"this plug-in failed in {method}: {words}",
+        subject=f"{package.name} {package.version}",
+        action="Report it to its maker, or uninstall it; a file of --log-file has where it failed",
+    )
+
+
+@lru_cache
+def _foreign(path: tuple[str, ...]) -> Mapping[str, Distribution]:
+    """The packages of others that announce plug-ins, by the first name of the modules that these are in."""
+    points = [point for group in Group for point in _announced(group, path)]
+    found = {point.module.partition(".")[0]: point.dist for point in points}
+    return {root: dist for root, dist in found.items() if dist is not None and dist.name != OWN}
 
 
 @lru_cache

@@ -27,7 +27,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.mechanisms.encoder_scales import WithEncoderScales
 from hexacell.kinematics.mechanisms.gough_stewart import GOUGH_STEWART_PARAMETERS, ScrewLegs, Screws
-from hexacell.plugins import Group, load
+from hexacell.plugins import Group, created
 
 StartupWord = Literal["reset-estop", "switch-on", "home"]
 STARTUP_WORDS: tuple[StartupWord, ...] = ("reset-estop", "switch-on", "home")
@@ -93,7 +93,7 @@ def mechanism_of(name: str, *, encoder_scales: bool) -> Mechanism:
     Raises:
         UsageError: it is not installed.
     """
-    found: Mechanism = load(Group.MECHANISMS, name)()
+    found: Mechanism = created(Group.MECHANISMS, name)
     return WithEncoderScales(found) if encoder_scales else found
 
 

@@ -53,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except HexacellError as error:
         return _failed(str(error), error.exit_code, console)
     except Exception as error:
-        return _failed(fault_line(error, typed), ExitCode.FAULT, console)
+        return _unforeseen(error, typed, console)
 
 
 def _carried_out(options: argparse.Namespace, typed: Sequence[str], console: Console) -> int:
@@ -98,6 +98,14 @@ def _require_usable(typed: Sequence[str]) -> None:
             raise UsageError(
                 f"'{argument[:20]}...' is not a valid file name", action="Shorten or correct it"
             )
+
+
+def _unforeseen(error: Exception, typed: Sequence[str], console: Console) -> int:
+    from hexacell.plugins import plugin_failure  # noqa: PLC0415 - slow, and only of use here
+
+    if (failed := plugin_failure(error)) is not None:
+        return _failed(str(failed), failed.exit_code, console)
+    return _failed(fault_line(error, typed), ExitCode.FAULT, console)
 
 
 def _failed(message: str, code: ExitCode, console: Console) -> int:

@@ -28,7 +28,7 @@ from hexacell.kinematics.corrections import NO_CORRECTIONS, CorrectionKind, Corr
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
 from hexacell.kinematics.parameters import JointUnit, ParameterSet
-from hexacell.plugins import Group, load
+from hexacell.plugins import Group, created
 from hexacell.storage import atomic_files
 
 CORRECTIONS_ROUNDED = 2e-6
@@ -66,7 +66,7 @@ class ConfigLayout:
         files = [(controller.config_format, controller.config_options)]
         files += [(one.config_format, one.config_options) for one in controller.further_files]
         formats = tuple(
-            FormatOfFile(name, load(Group.CONFIG_FORMATS, name)(parameters, options, is_part=is_part))
+            FormatOfFile(name, created(Group.CONFIG_FORMATS, name, parameters, options, is_part=is_part))
             for name, options in files
         )
         return cls(parameters, formats, settings.mechanism.words.joint_unit)

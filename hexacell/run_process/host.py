@@ -10,6 +10,7 @@ from socket import socket
 
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.errors import ExitCode, HexacellError
+from hexacell.plugins import plugin_failures_named
 from hexacell.run_process import messages
 from hexacell.run_process.audience import Audience, audience_server
 from hexacell.run_process.live_devices import RunDeviceWatch
@@ -110,7 +111,8 @@ class RunHost:
     async def _run(self) -> ExitCode:
         request, live = self._request, self._watching.live
         try:
-            ended = await calibrate(request, [self._record], self._queue, live, self._watch)
+            with plugin_failures_named():
+                ended = await calibrate(request, [self._record], self._queue, live, self._watch)
         except HexacellError as error:
             self._fail(failure_message(error))
             return error.exit_code

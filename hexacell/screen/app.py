@@ -15,6 +15,7 @@ from textual.css.query import NoMatches
 from textual.screen import Screen
 
 from hexacell.errors import HexacellError
+from hexacell.plugins import plugin_failures_named
 from hexacell.screen import overlays, tabs
 from hexacell.screen.further_screens import AssistantScreen, DigitsScreen, PlanScreen
 from hexacell.screen.preferences import KEYS, ONCE, SCREEN_THEMES, THEMES, ScreenAction, ScreenPreferences
@@ -100,7 +101,8 @@ class TechnicianApp(App[int]):
             if not await self._has_cell():
                 self.exit(0)
                 return
-            self.model = await asyncio.to_thread(self._load)
+            with plugin_failures_named():
+                self.model = await asyncio.to_thread(self._load)
             self.draw()
             self.set_interval(DRAWN_EVERY_S, self.draw)
             self.run_worker(self._make_screens(), exit_on_error=False, group="make")
@@ -168,7 +170,9 @@ class TechnicianApp(App[int]):
 
     async def _waiting_for(self, work: Coroutine[Any, Any, str | None]) -> None:
         try:
-            if said := await work:
+            with plugin_failures_named():
+                said = await work
+            if said:
                 self.notify(said, markup=False)
         except HexacellError as error:
             self._show_error(error)

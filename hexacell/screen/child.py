@@ -10,6 +10,7 @@ from hexacell.cell.fields import Frozen
 from hexacell.cell.loader import load_cell
 from hexacell.dry_run.campaign import VisitedPose
 from hexacell.errors import HexacellError
+from hexacell.plugins import plugin_failures_named
 from hexacell.python_process import python_command
 from hexacell.services.offline import try_plan
 from hexacell.services.run.calibration_run import preflight
@@ -62,7 +63,8 @@ async def run_child(wanted: type[Found], cell: Path, mode: str = "") -> Found:
 def find_preflight(path: Path, mode: Mode) -> Preflight:
     """The findings of a preflight, and whether a run may begin."""
     try:
-        devices = asyncio.run(preflight(load_cell(path), mode, unattended=False))
+        with plugin_failures_named():
+            devices = asyncio.run(preflight(load_cell(path), mode, unattended=False))
     except HexacellError as error:
         return Preflight(items=failed_items(error), is_ready=False)
     return Preflight(items=checked_items(Mark.DONE, [device_line(one) for one in devices]), is_ready=True)
@@ -71,7 +73,8 @@ def find_preflight(path: Path, mode: Mode) -> Preflight:
 def find_plan(path: Path) -> TriedPlan:
     """The forecast of the plan on simulated robots, and its poses; or why it cannot be tried."""
     try:
-        trial = try_plan(load_cell(path))
+        with plugin_failures_named():
+            trial = try_plan(load_cell(path))
     except HexacellError as error:
         return TriedPlan(lines=(str(error),))
     return TriedPlan(lines=tuple(plan_trial_lines(trial)), poses=trial.result.visited)

@@ -1,14 +1,22 @@
-"""Plug-ins announced by installed packages, some of which are broken."""
+"""Protects how plug-ins of installed packages are found, and that their failures are told as theirs."""
 
+import asyncio
+import json
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
+from drivers.errors import translated
 from hexacell import plugins
-from hexacell.errors import ExitCode, UsageError
-from hexacell.plugins import Group
+from hexacell.cli import app
+from hexacell.cli.commands import cell
+from hexacell.errors import DeviceError, ExitCode, UsageError
+from hexacell.plugins import Group, PluginFailed
 
 Install = Callable[..., None]
 
@@ -74,3 +82,84 @@ def test_an_installation_found_twice_is_one(install: Install) -> None:
     install("laser_g", "laser = laser_g:Laser", "class Laser: ...")
     install("laser_h", "laser = laser_g:Laser", "")
     assert plugins.load(Group.GAUGES, "laser").__name__ == "Laser"
+
+
+FAILING = """
+class Laser:
+    def __init__(self, settings, ports):
+        if settings == "broken":
+            raise KeyError("no such laser")
+
+    async def read(self):
+        return self._parsed([])
+
+    def _parsed(self, values):
+        return values[0]
+
+    async def unplugged(self):
+        raise ConnectionResetError("gone")
+
+    async def on_the_wire(self, call):
+        call()
+"""
+
+
+@pytest.fixture
+def laser(install: Install) -> Callable[[object], Any]:
+    install("laser_k", "laser = laser_k:Laser", FAILING)
+    return lambda settings: plugins.created(Group.GAUGES, "laser", settings, None)
+
+
+def test_what_a_plugin_raises_is_told_with_its_package_version_and_method(laser) -> None:
+    with pytest.raises(
+        PluginFailed, match=r"^laser_k 1\.0: .* in laser_k\.Laser\.__init__: KeyError"
+    ) as caught:
+        laser("broken")
+    assert caught.value.exit_code is ExitCode.HARDWARE
+    with pytest.raises(PluginFailed, match=r"laser_k 1\.0: .* in laser_k\.Laser\.read: IndexError"):
+        asyncio.run(translated(laser("sound"), "gauge x").read())
+    with pytest.raises(DeviceError, match="gauge x: its driver failed"):
+        asyncio.run(translated(laser("sound"), "gauge x").unplugged())
+
+
+@pytest.mark.parametrize("body", ["class Laser: ...", "def Laser(): ..."])
+def test_one_that_cannot_even_be_called_is_named_too(install: Install, body: str) -> None:
+    install("laser_m", "laser = laser_m:Laser", body)
+    with pytest.raises(PluginFailed, match=r"laser_m 1\.0: .* in Laser: TypeError"):
+        plugins.created(Group.GAUGES, "laser", None, None)
+
+
+def test_errors_of_this_program_stay_its_own(laser) -> None:
+    def fail() -> None:
+        raise ValueError("ours")
+
+    with pytest.raises(ValueError, match="ours"), plugins.plugin_failures_named():
+        fail()
+    with pytest.raises(TypeError, match="argument"):
+        plugins.created(Group.MECHANISMS, "hexaglide", "too much")
+    with pytest.raises(UsageError, match="ours"):
+        asyncio.run(translated(laser("sound"), "x").on_the_wire(Mock(side_effect=UsageError("ours"))))
+
+
+@pytest.mark.parametrize("group", [Group.GAUGES, Group.ENCODERS, Group.CONTROLLERS, Group.THERMOMETERS])
+def test_no_place_makes_a_plugin_without_naming_its_failures(group: Group) -> None:
+    """``load`` alone is for those that only ask what a class is."""
+    called = re.compile(rf"load\(\s*Group\.{group.name},[^()]*\)\(")
+    for package in ("hexacell", "drivers", "procedures"):
+        for path in (Path(plugins.__file__).parents[1] / package).rglob("*.py"):
+            assert not called.search(path.read_text()), path
+
+
+def test_a_command_ends_with_it(install: Install, capsys, monkeypatch) -> None:
+    install("laser_n", "laser = laser_n:Laser", "class Laser:\n    def find(self): return {}['x']")
+
+    def find(*_: object) -> int:
+        return int(plugins.created(Group.GAUGES, "laser").find())
+
+    monkeypatch.setattr(cell, "main", find)
+    assert app.main(["cell", "schema", "--json"]) == ExitCode.HARDWARE
+    captured = capsys.readouterr()
+    assert captured.err.startswith(
+        "hexacell: laser_n 1.0: this plug-in failed in laser_n.Laser.find: KeyError"
+    )
+    assert json.loads(captured.out)["exit_code"] == ExitCode.HARDWARE

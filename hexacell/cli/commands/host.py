@@ -15,6 +15,7 @@ from hexacell.cell.loader import load_cell
 from hexacell.cli.console import Console
 from hexacell.cli.terminal import SignalCommands
 from hexacell.errors import ExitCode, HexacellError
+from hexacell.plugins import plugin_failures_named
 from hexacell.run_process.client import READY
 from hexacell.run_process.host import RemoteOperator, RunHost, failure_message
 from hexacell.run_process.messages import message_line
@@ -29,7 +30,8 @@ def main(options: argparse.Namespace, _: Console) -> ExitCode:
     if os.fork():
         os._exit(0)  # whoever started it need not wait for its end
     try:
-        _serve(options)
+        with plugin_failures_named():
+            _serve(options)
     except HexacellError as error:
         _say(message_line(failure_message(error)))
         return error.exit_code

@@ -13,6 +13,7 @@ from hexacell.cell.loader import is_cell_file
 from hexacell.cli.commands.cell import archive_url, cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, FileError, HexacellError, UsageError
+from hexacell.plugins import plugin_failures_named
 from hexacell.services.history.cell_status import (
     CellStatus,
     FleetCell,
@@ -77,7 +78,8 @@ def _all(paths: Sequence[Path], console: Console) -> tuple[list[CellStatus], dic
         if len(paths) > 1 and not is_cell_file(path):
             continue
         try:
-            found.append(cell_status(cell_at(path, console)))
+            with plugin_failures_named():
+                found.append(cell_status(cell_at(path, console)))
         except HexacellError as error:
             if len(paths) == 1:
                 raise

@@ -11,6 +11,7 @@ from hexacell.cli.commands.cell import cell_at
 from hexacell.cli.console import Console
 from hexacell.cli.terminal import SignalCommands
 from hexacell.errors import ExitCode, FileError, HexacellError, UsageError
+from hexacell.plugins import plugin_failures_named
 from hexacell.services.history.cell_status import cell_status, publish_status
 from hexacell.services.run.calibration_run import RunRequest
 from hexacell.services.unattended.notice import (
@@ -80,7 +81,8 @@ def notified_afterwards(request: RunRequest, console: Console, run: Callable[[],
     The outcome of the run stays what it is, whatever goes wrong here.
     """
     try:
-        end = run()
+        with plugin_failures_named():
+            end = run()
     except Exception as error:
         _notify(request, console, error)
         _publish(request.cell, console)

@@ -18,7 +18,7 @@ from hexacell.cell.passwords import with_passwords
 from hexacell.clock import CellClock
 from hexacell.config.layout import ConfigLayout, CurrentConfig
 from hexacell.kinematics.mechanism import joint_zeros
-from hexacell.plugins import Group, load
+from hexacell.plugins import Group, created
 from procedures.devices.device_set import Devices, MountedGauge, Thermometers
 from procedures.run.cancellation import shielded
 
@@ -92,7 +92,7 @@ def devices_of(
     gauges = tuple(
         MountedGauge(
             translated(
-                load(Group.GAUGES, gauge.protocol)(gauge_with_agreement(gauge, settings.noise), links),
+                created(Group.GAUGES, gauge.protocol, gauge_with_agreement(gauge, settings.noise), links),
                 f"gauge {gauge.name}",
             ),
             gauge.mounting,
@@ -100,7 +100,7 @@ def devices_of(
         for gauge in settings.gauges
     )
     controller = translated(
-        load(Group.CONTROLLERS, settings.controller.protocol)(settings.controller, trace=trace),
+        created(Group.CONTROLLERS, settings.controller.protocol, settings.controller, trace=trace),
         "controller",
     )
     wiring: dict[str, object] = {"trace": trace}
@@ -110,7 +110,7 @@ def devices_of(
             config = CurrentConfig(config_paths(settings, folder or Path()), ConfigLayout.of(settings))
             # By how much joints that include zeros exceed what the encoders show, by the current config.
             wiring["zeros"] = lambda: joint_zeros(settings.mechanism, config.geometry().geometry).tolist()
-    encoders = load(Group.ENCODERS, settings.encoders.protocol)(encoders_with_speed(settings), **wiring)
+    encoders = created(Group.ENCODERS, settings.encoders.protocol, encoders_with_speed(settings), **wiring)
     return Devices(
         gauges,
         translated(encoders, "encoders"),
@@ -154,7 +154,7 @@ async def open_devices(settings: CellSettings, folder: Path | None = None) -> As
     links = SharedSerialPorts(trace=trace)
     devices = devices_of(settings, links, trace, folder)
     thermometers = Thermometers(
-        [load(Group.THERMOMETERS, one.protocol)(one) for one in settings.thermometers]
+        [created(Group.THERMOMETERS, one.protocol, one) for one in settings.thermometers]
     )
     try:
         identities = (*await devices.open(), *await thermometers.open())

@@ -18,7 +18,7 @@ from hexacell.config.layout import ConfigLayout
 from hexacell.config.toml_format import native_layout
 from hexacell.errors import FileError, HexacellError, flatten_errors
 from hexacell.kinematics.mechanism import Mechanism
-from hexacell.plugins import Group, load, names
+from hexacell.plugins import Group, created, names
 from hexacell.services.offline import require_stated_poses
 from hexacell.storage.output_files import NEW_CELL, OutputFile
 from hexacell.storage.toml_document import KeyPath, TomlDocument
@@ -246,5 +246,5 @@ class CellDraft:
 
 
 def _config_layout() -> ConfigLayout:
-    mechanism: Mechanism = load(Group.MECHANISMS, DEFAULT_MECHANISM)()
+    mechanism: Mechanism = created(Group.MECHANISMS, DEFAULT_MECHANISM)
     return native_layout(mechanism.parameters)

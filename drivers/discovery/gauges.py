@@ -18,6 +18,7 @@ from drivers.serial.request_port import FrameLog, NoAnswer
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError, HexacellError
+from hexacell.plugins import plugin_failures_named
 
 LISTENED_BAUD_RATES = (9600, 115200)
 """Rates at which a port is listened to for numbers, where no protocol answers."""
@@ -90,7 +91,8 @@ async def search_port(
         settings = _settings(protocol, port, timeouts.gauge, baudrate)
         settings = settings.model_copy(update={"settle_s": timeouts.restart * probes[protocol].restarts})
         try:
-            found = await _channels(factories[protocol], settings, heard)
+            with plugin_failures_named():
+                found = await _channels(factories[protocol], settings, heard)
         except HexacellError as error:
             return PortFindings(port, problem=f"{error.problem}. {error.action}")
         if found:

@@ -14,6 +14,7 @@ from hexacell.cli.arguments.commands import output_of
 from hexacell.cli.console import Console, lost_output
 from hexacell.cli.process import fault_line, log, require_platform, stop_signals_as_sigint
 from hexacell.errors import ExitCode, HexacellError, UsageError
+from hexacell.printable import PrintableFormatter
 from hexacell.storage.output_files import LOG, OutputFile
 
 _log = logging.getLogger(__name__)
@@ -28,6 +29,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return the process's exit code."""
     # Before numpy is imported, which reads it: the matrices are small, threads only slow them down.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    if logging.lastResort is not None:  # which prints warnings where no log was asked for
+        logging.lastResort.setFormatter(PrintableFormatter())
     typed = sys.argv[1:] if arguments is None else list(arguments)
     console = Console("--json" in typed)
     try:

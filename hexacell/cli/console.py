@@ -1,4 +1,4 @@
-"""Output of a command: text on stdout, or on stderr where stdout carries a JSON document."""
+"""Output of a command, printable: text on stdout, or on stderr where stdout carries a JSON document."""
 
 import json
 import os
@@ -7,6 +7,8 @@ from dataclasses import asdict, dataclass, is_dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any, TextIO
+
+from hexacell.printable import printable
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +63,7 @@ def _write(stream: TextIO | None, text: str) -> None:
     try:
         # A locale may know no letter beyond ASCII.
         encoding = stream.encoding or "utf-8"
-        stream.write(text.encode(encoding, "backslashreplace").decode(encoding))
+        stream.write(printable(text).encode(encoding, "backslashreplace").decode(encoding))
         stream.flush()
     except BrokenPipeError:
         _discard_rest(stream)

@@ -23,6 +23,7 @@ from types import FrameType
 
 from hexacell import __version__
 from hexacell.errors import FileError, UsageError
+from hexacell.printable import PrintableFormatter, printable
 from hexacell.storage.output_files import OutputFile
 
 _ENDING = "TERM HUP QUIT USR1 USR2 ALRM VTALRM PROF IO XCPU PWR STKFLT"
@@ -90,7 +91,7 @@ def _keep(error: Exception, typed: Sequence[str]) -> Path:
     head = f"hexacell {__version__}, Python {platform.python_version()}, {platform.platform()}\n"
     command = f"hexacell {shlex.join(typed)}\n"
     with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as report:
-        report.write(head + command + "".join(traceback.format_exception(error)))
+        report.write(printable(head + command + "".join(traceback.format_exception(error))))
     return Path(name)
 
 
@@ -131,7 +132,7 @@ def log(file: OutputFile | None, verbosity: int) -> Iterator[None]:
         problem = f"the log cannot be written: {error.strerror or error}"
         raise FileError(problem, subject=file.path if file else None, action="Name another file") from error
     handler = logging.StreamHandler(stream)
-    formatter = logging.Formatter(FORMAT, "%Y-%m-%dT%H:%M:%S")
+    formatter = PrintableFormatter(FORMAT, "%Y-%m-%dT%H:%M:%S")
     formatter.converter = time.gmtime
     handler.setFormatter(formatter)
     level = logging.DEBUG if verbosity + (file is not None) > 1 else logging.INFO

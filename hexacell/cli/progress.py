@@ -10,6 +10,7 @@ from rich.console import Console as RichConsole
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from hexacell.cli.console import Console
+from hexacell.printable import printable
 from hexacell.run_process.live_devices import RunDeviceWatch
 from hexacell.text.layout import wrapped
 from hexacell.text.line_face import EventFormatter, activity, gauges_text, record_text
@@ -48,7 +49,8 @@ class RunProgress:
             self.bar.stop()
         else:
             self.bar.start()
-        self.bar.update(self._task, completed=state.completed, description=activity(event))
+        doing = activity(event)
+        self.bar.update(self._task, completed=state.completed, description=doing and printable(doing))
         for line in self._formatter.lines(event, state):
             self._console.print(line)
         if self._is_plain and isinstance(event, events.RecordTaken):
@@ -84,7 +86,7 @@ def _may_ask(event: events.Event) -> bool:
 def _bar() -> Progress:
     terminal = sys.stderr is not None and sys.stderr.isatty()
     return Progress(
-        TextColumn("{task.description:<40}"),
+        TextColumn("{task.description:<40}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeRemainingColumn(),

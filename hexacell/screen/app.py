@@ -16,6 +16,7 @@ from textual.screen import Screen
 
 from hexacell.errors import HexacellError
 from hexacell.plugins import plugin_failures_named
+from hexacell.printable import printable
 from hexacell.screen import overlays, tabs
 from hexacell.screen.further_screens import AssistantScreen, DigitsScreen, PlanScreen
 from hexacell.screen.preferences import KEYS, ONCE, SCREEN_THEMES, THEMES, ScreenAction, ScreenPreferences
@@ -173,7 +174,7 @@ class TechnicianApp(App[int]):
             with plugin_failures_named():
                 said = await work
             if said:
-                self.notify(said, markup=False)
+                self.notify(printable(said), markup=False)
         except HexacellError as error:
             self._show_error(error)
 

@@ -16,6 +16,7 @@ from textual.screen import Screen
 from textual.widgets import OptionList, Static
 from textual.widgets.option_list import Option
 
+from hexacell.printable import printable
 from hexacell.screen.preferences import KEYS, ScreenAction
 from hexacell.text.screens.views import Line, PlotView, Urgency, plot_lines
 
@@ -27,6 +28,7 @@ class TextPanel(Static):
     """Text without markup; its class says how urgent it is."""
 
     def __init__(self, text: str = "", *, id: str | None = None, classes: str | None = None) -> None:  # noqa: A002 - as in every widget
+        text = printable(text)
         super().__init__(text, id=id, classes=classes, markup=False)
         self._text, self._urgency = text, Urgency.CALM
 
@@ -37,6 +39,7 @@ class TextPanel(Static):
 
     def show(self, text: str, urgency: Urgency = Urgency.CALM) -> None:
         """Show a text."""
+        text = printable(text)
         if text != self._text:
             self._text = text
             self.update(text)
@@ -162,7 +165,7 @@ class RowList(OptionList):
         name, row = self.chosen, self.highlighted or 0
         self._rows = list(rows)
         self.clear_options()
-        self.add_options(Option(Content(line), id=name) for name, line in rows)
+        self.add_options(Option(Content(printable(line)), id=name) for name, line in rows)
         names = [one for one, _ in rows]
         self.highlighted = (
             names.index(name) if name in names else min(row, len(names) - 1) if names else None

@@ -10,6 +10,7 @@ from markupsafe import Markup
 
 from hexacell import __version__
 from hexacell.errors import UsageError
+from hexacell.printable import printable
 from hexacell.services.history.reported_run import ReportedRun
 from hexacell.text.parameters import rows_of_run
 from hexacell.text.report.pages import rendered
@@ -114,5 +115,5 @@ def _release(version: str) -> str:
 def _in_one_line(value: object) -> object:
     """A text in one line, as most types of the schema want it."""
     if isinstance(value, str) and not isinstance(value, Markup):
-        return " ".join(_NOT_IN_XML.sub("?", value).split())
+        return printable(" ".join(_NOT_IN_XML.sub("?", value).split()))
     return value

@@ -28,6 +28,7 @@ from pathlib import Path
 from typing import Self
 
 from hexacell.errors import HexacellError, UsageError
+from hexacell.printable import printable
 from hexacell.storage.atomic_files import require_no_link
 
 LOCK = Path("/tmp/linuxcnc.lock")  # noqa: S108 - LinuxCNC's own, there from its start to its end
@@ -135,7 +136,7 @@ def main() -> int:
             raise UsageError("no INI file is named", action="hexacell-restart-linuxcnc FILE.ini")
         restart(Path(sys.argv[1]).absolute())
     except (HexacellError, OSError) as error:
-        print(f"hexacell-restart-linuxcnc: {error}", file=sys.stderr)  # noqa: T201 - a command of its own
+        print(printable(f"hexacell-restart-linuxcnc: {error}"), file=sys.stderr)  # noqa: T201 - a command of its own
         return 1
     return 0
 

@@ -25,6 +25,7 @@ from hexacell.config.interface import NumberToken, token_error
 from hexacell.config.linuxcnc_hal import HalText
 from hexacell.config.linuxcnc_ini import IniText
 from hexacell.errors import FileError, HexacellError, UsageError
+from hexacell.printable import printable
 from hexacell.storage.atomic_files import read_text
 
 KINEMATICS_CYCLES_S = 0.1
@@ -44,7 +45,7 @@ def main() -> int:
     try:
         count = set_pins([Path(name) for name in sys.argv[1:]])
     except HexacellError as error:
-        print(f"hexacell-set-pins: {error}", file=sys.stderr)  # noqa: T201 - a command of its own
+        print(printable(f"hexacell-set-pins: {error}"), file=sys.stderr)  # noqa: T201 - a command of its own
         return 1
     print(f"{count} pins set")  # noqa: T201
     return 0

@@ -2,7 +2,6 @@
 
 import argparse
 import asyncio
-import sys
 from collections.abc import Coroutine
 from contextlib import suppress
 from typing import Any
@@ -47,7 +46,7 @@ def simulate(options: argparse.Namespace, console: Console) -> ExitCode:
 async def _serve_cell(cell: Cell, options: argparse.Namespace) -> None:
     with served_cell(cell) as text:
         if options.output is None:
-            print(text, flush=True)
+            Console().print(text)
         else:
             options.output.write(SERVED_MARK + text.encode())
         _announce("serving")
@@ -62,4 +61,4 @@ def _until_stopped(serving: Coroutine[Any, Any, None]) -> ExitCode:
 
 
 def _announce(what: str) -> None:
-    print(f"{what}; Ctrl-C ends it", file=sys.stderr, flush=True)
+    Console().error(f"{what}; Ctrl-C ends it")

@@ -14,6 +14,7 @@ from hexacell.cli.commands.cell import archive_url, cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, FileError, HexacellError, UsageError
 from hexacell.plugins import plugin_failures_named
+from hexacell.printable import printable
 from hexacell.services.history.cell_status import (
     CellStatus,
     FleetCell,
@@ -113,13 +114,17 @@ def metrics_text(found: Sequence[CellStatus]) -> str:
     for one in found:
         for name, labels, value in _samples(one):
             named = {"cell": one.cell.settings.name, **labels}
-            shown = ",".join(f'{label}="{text.translate(ESCAPES)}"' for label, text in named.items())
+            shown = ",".join(f'{label}="{_escaped(text)}"' for label, text in named.items())
             samples[name].append(f"{name}{{{shown}}} {value}")
     return "".join(
         f"# HELP {name} {HELP[name]}\n# TYPE {name} gauge\n" + "".join(f"{line}\n" for line in lines)
         for name, lines in samples.items()
         if lines
     )
+
+
+def _escaped(text: str) -> str:
+    return printable(text).translate(ESCAPES)
 
 
 def _lines(one: CellStatus) -> Iterator[str]:

@@ -5,18 +5,23 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from hashlib import sha256
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator
 
 from hexacell.cell.fields import Frozen, Name, Text
 from hexacell.cell.loader import Cell
 from hexacell.cell.operation import Occasion
 from hexacell.errors import AnswerNeeded, DeviceError, ExitCode, HexacellError
+from hexacell.printable import printable
 from hexacell.services.history.cell_status import next_calibration_due
 from hexacell.services.history.past_runs import past_runs
 from hexacell.services.run.calibration_run import RunRequest
 from hexacell.verdict.decision import Verdict
 from procedures.run.state import RunState
 from procedures.steps import events
+
+Shown = Annotated[str, AfterValidator(printable)]
 
 
 class Notice(Frozen):
@@ -36,13 +41,13 @@ class Notice(Frozen):
     version: Literal[1] = 1
     id: str
     cell: Name
-    host: str
-    run: str | None
-    mode: str
+    host: Shown
+    run: Shown | None
+    mode: Shown
     at: datetime
     occasions: tuple[Occasion, ...]
     exit_code: int
-    line: str
+    line: Shown
     verdict: Verdict | None = None
     position_mm: float | None = None
     expanded_mm: float | None = None

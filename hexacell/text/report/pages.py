@@ -15,6 +15,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from hexacell.errors import UsageError
+from hexacell.printable import printable
 
 TEMPLATES = Path(__file__).parent
 PDF_STANDARD: Final = "a-2b"
@@ -98,10 +99,11 @@ class Report:
 def rendered(
     template: str, written: Callable[[Any], Any] | None = None, *, is_markup: bool = True, **values: object
 ) -> str:
-    """A template of this package with its values, to each of which ``written`` is done before.
+    """A template of this package with its values: each as ``written`` makes it, or printable.
 
     ``is_markup`` is whether it is HTML or XML; then every text in it is escaped.
     """
+    written = written or _shown
     environment = Environment(
         loader=FileSystemLoader(TEMPLATES),
         autoescape=is_markup,  # noqa: S701 - in typst each text is a literal
@@ -113,6 +115,10 @@ def rendered(
     )
     environment.filters["style_string"] = _style_string
     return environment.get_template(template).render(values)
+
+
+def _shown(value: object) -> object:
+    return printable(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
 def _style_string(text: str) -> str:

@@ -21,10 +21,11 @@ from hexacell.cli.console import Console
 from hexacell.cli.process import fault_line, log
 from hexacell.printable import printable
 from hexacell.screen.widgets import RowList, TextPanel
+from hexacell.text.report.pages import html_of
 from procedures.journal.journal import encode, read_entries
 from procedures.steps import events
 from tests.hexacell.services.notify.notices import a_notice
-from tests.hexacell.text.test_report_pages import html_of, report
+from tests.hexacell.text.test_report_pages import report
 
 CHECKOUT = Path(__file__).parents[2]
 HOSTILE = "a\x1b]0;title\x07\x1b[2J\x9b31m\x00\x08\x7f\r\u202e\u2066\u200b\u2028\udce9[red]\U000e0001z"
@@ -80,7 +81,7 @@ def test_no_log_or_report_of_a_fault_has_any(tmp_path, monkeypatch) -> None:
 
 async def test_no_widget_has_any() -> None:
     class OneOfEach(App[None]):
-        def compose(self):  # type: ignore[no-untyped-def]
+        def compose(self):
             yield TextPanel(HOSTILE)
             yield RowList()
 

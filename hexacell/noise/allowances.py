@@ -10,7 +10,7 @@ moved.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -30,6 +30,9 @@ from hexacell.robot.stated import gauge_travel_of
 
 SIGMAS = 5.0
 """Standard deviations up to which a difference is chance, at some hundred stops of six joints each."""
+
+DENIED = 3.0
+"""Standard deviations by which gauges must contradict an encoder that shows more than chance."""
 
 SCATTER = 1.5
 """Noise of the encoders over what is stated from which the ball may leave the travel by chance."""
@@ -105,11 +108,14 @@ class Allowances:
         """
         ball, change = self.ball_at(reference, before[3:]), now - before
         joints, noise = change[3:], self.robot.noise
-        covariance = 2.0 * noise.record_covariance(ball.by_joints[None])[0] + ball.covariance(joints)
+        readings_covariance = 2.0 * noise.record_covariance(ball.by_joints[None])[0]
+        covariance = readings_covariance + ball.covariance(joints)
         is_fixed = self.settings.guards.limits == "fixed"
         explicable = SIGMAS * np.sqrt(np.diag(covariance) + readings * noise.walk_mm**2)
-        if unknown is not None:
-            explicable = explicable + np.abs(ball.by_joints) @ unknown
+        unknown = np.zeros(LEGS) if unknown is None else unknown
+        explicable = explicable + np.abs(ball.by_joints) @ unknown
+        chance = float(np.sqrt(2.0)) * self.stop_sigmas * np.hypot(noise.encoders, self.stops) + unknown
+        is_known = self.is_measured or not self.settings.noise.revisits
         return ReferenceChange(
             unexplained_mm=change[:3] - ball.motion(joints),
             covariance=covariance,
@@ -118,6 +124,10 @@ class Allowances:
             joints=joints,
             explicable_joints=0.0 if is_fixed else float(np.sqrt(2.0)) * self.stop_sigmas * self.stops,
             readings=readings,
+            by_joints=ball.by_joints,
+            chance_joints=chance if is_known else np.full(LEGS, np.inf),
+            at_rest=readings_covariance + ball.covariance(joints - np.diag(joints)),
+            walk_mm=noise.walk_mm,
         )
 
     def between_visits(self, reference: Pose, visits: Array) -> tuple[ReferenceChange, ...]:
@@ -184,6 +194,10 @@ class ReferenceChange:
         joints: (6,) of the encoders.
         explicable_joints: up to which the scatter of the stops explains these.
         readings: how many later the second one is; 0 of visits one after the other.
+        by_joints: (3, 6) derivative of the ball's position, mm by the joints' unit.
+        chance_joints: (6,) up to which an encoder that did not slip may differ.
+        at_rest: (6, 3, 3), mm^2, the ``covariance`` if that leg did not move, whatever its encoder shows.
+        walk_mm: of the drift of the gauges from one reading to the next.
     """
 
     unexplained_mm: Array
@@ -193,6 +207,10 @@ class ReferenceChange:
     joints: Array
     explicable_joints: float
     readings: int = 0
+    by_joints: Array = field(default_factory=lambda: np.zeros((3, LEGS)))
+    chance_joints: Array = field(default_factory=lambda: np.full(LEGS, np.inf))
+    at_rest: Array = field(default_factory=lambda: np.zeros((LEGS, 3, 3)))
+    walk_mm: float = 0.0
 
     def exceeds(self, limit_mm: float) -> bool:
         """Whether a gauge shows more than a limit, and more than is explicable."""
@@ -202,3 +220,24 @@ class ReferenceChange:
         """The leg, from 0, whose encoder shows most, beyond a limit and what is explicable; or None."""
         leg = int(np.abs(self.joints).argmax())
         return leg if abs(self.joints[leg]) > max(limit, self.explicable_joints) else None
+
+    def slipped_encoder(self) -> int | None:
+        """The leg, from 0, whose encoder shows more than chance, and the gauges deny it; None if none does.
+
+        A joint that stopped elsewhere takes the ball along, as far as the geometry is known. Where only the
+        encoder changed, the gauges lack exactly the share of that joint: the likelihoods are compared.
+        """
+        drift = self.readings * self.walk_mm**2 * np.eye(3)
+
+        def unlikelihood(unexplained: Array, covariance: Array) -> float:
+            whole = covariance + drift
+            return float(unexplained @ np.linalg.solve(whole, unexplained) + np.linalg.slogdet(whole)[1])
+
+        beyond: list[int] = np.flatnonzero(np.abs(self.joints) > self.chance_joints).tolist()
+        if not beyond:
+            return None
+        shares = self.by_joints * self.joints
+        slips = [unlikelihood(self.unexplained_mm + shares[:, leg], self.at_rest[leg]) for leg in beyond]
+        best = int(np.argmin(slips))
+        is_denied = unlikelihood(self.unexplained_mm, self.covariance) - slips[best] > DENIED**2
+        return beyond[best] if is_denied else None

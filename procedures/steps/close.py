@@ -66,11 +66,13 @@ class CloseSet(StepOfSet):
     doing: ClassVar[str] = "reading the reference again, for the drift"
 
     async def perform(self, run: RunResources, state: RunState) -> SetClosed:
-        """Read again; raises ``DriftTripped`` if gauges show what neither encoders nor noise explain."""
+        """Read again; raises ``DriftTripped`` if encoders or gauges show what nothing else explains."""
         reading = await run.read(state)
         change = run.since_reference(state, self.at, reading)
         await run.check_gauges()
-        if trip := reference_drift(str(self.at), change, run.settings.acceptance.drift_mm):
+        unit = run.settings.mechanism.words.joint_unit
+        trip = encoder_slip(str(self.at), change, unit)
+        if trip := trip or reference_drift(str(self.at), change, run.settings.acceptance.drift_mm):
             raise trip.as_error()  # not latched, as nothing moved
         drift_mm = deviation_of(change.unexplained_mm)
         closed = SetClosed(at=self.at, drift_mm=drift_mm, reading=reading, reason=self.reason)
@@ -91,4 +93,26 @@ def reference_drift(point: str, change: ReferenceChange, limit_mm: float) -> Tri
         f"back at the reference the gauges show {in_words(change.unexplained_mm)} that the encoders do not "
         f"explain, more than {limit_mm:g} mm",
         "A gauge slipped, or something moved; resume measures this point again",
+    )
+
+
+def encoder_slip(point: str, change: ReferenceChange, unit: str) -> Trip | None:
+    """The trip of a set at whose end an encoder shows another place than the gauges."""
+    if (leg := change.slipped_encoder()) is None:
+        return None
+    return Trip(
+        Guard.DRIFT,
+        f"encoder {leg + 1}",
+        f"{point}: back at the reference {slip_in_words(change, leg, unit)}",
+        "It slipped or lost counts: see to its mount, scale and cable. Resume measures this point again; "
+        "points before it have its old zero, so begin a new run if it stays there",
+    )
+
+
+def slip_in_words(change: ReferenceChange, leg: int, unit: str) -> str:
+    """What an encoder that slipped shows back at a reference."""
+    limit = change.chance_joints[leg]
+    return (
+        f"q{leg + 1} shows {change.joints[leg]:+.3f} {unit}, more than {limit:.3f} by chance, and the "
+        "gauges deny that it moved"
     )

@@ -11,6 +11,7 @@ from procedures.run.keys import Phase, ThreeNumbers
 from procedures.run.readings import Reading, in_words
 from procedures.run.state import RunState
 from procedures.steps.base import EventOfSet, StepOfSet
+from procedures.steps.close import slip_in_words
 
 
 class ReferenceConfirmed(EventOfSet):
@@ -67,6 +68,10 @@ class Revisit(StepOfSet):
         await run.check_gauges()
         change = run.since_reference(state, self.at, reading)
         limit_mm, joint_limit = run.settings.reference_agreement
+        if (leg := change.slipped_encoder()) is not None:
+            slipped = slip_in_words(change, leg, run.settings.mechanism.words.joint_unit)
+            reason = f"back at its reference {slipped}"
+            return SetInvalidated(at=self.at, reason=reason, reading=reading)
         if change.exceeds(limit_mm):
             shown = f"the gauges show {in_words(change.unexplained_mm)} that the encoders do not explain"
             reason = f"back at its reference {shown}, more than {limit_mm:g} mm"

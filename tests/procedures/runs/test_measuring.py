@@ -48,6 +48,22 @@ async def test_a_slipped_gauge_stops_the_run_and_the_point_is_measured_again(rec
     assert [str(event.at) for event in happened(rig, events.SetInvalidated)] == ["P2"]
 
 
+@pytest.mark.parametrize("slip_mm", [0.05, -0.3])
+async def test_a_slipped_encoder_is_named_at_the_end_of_its_set(
+    recording, replayed, slip_mm: float
+) -> None:
+    """Gauges would be blamed for the larger one, as they show what the encoders do not explain."""
+    rig = replayed(recording.until(events.SetClosed, count=1), identification__orientations=4)
+    real, slipped = rig.bench.encoders.shown, [0.0] * 6
+    rig.bench.encoders.shown = lambda: [q + more for q, more in zip(real(), slipped, strict=True)]
+
+    with pytest.raises(LimitError, match=r"encoder 3: P2: back at the reference q3 shows [+-]0\.\d+ mm"):
+        await rig.run(on(events.RecordTaken, lambda: slipped.__setitem__(2, slip_mm), count=2))
+    assert rig.controller.log[-1] == "stop"
+    await run_until(rig, events.SetClosed)
+    assert [str(event.at) for event in happened(rig, events.SetInvalidated)] == ["P2"]
+
+
 async def test_gauges_placed_by_hand_are_requested_at_every_point(recording, replayed) -> None:
     rig = replayed(recording.until(events.SetClosed, count=2), stations__placement="by-hand")
     await rig.run()

@@ -1,0 +1,77 @@
+"""An encoder that slipped is told from a joint that stopped elsewhere, and from a gauge that slipped."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
+from hexacell.kinematics.pose import Pose
+from hexacell.noise.allowances import Allowances
+from hexacell.robot.model import robot_of
+
+MEASURED = {"encoder": 0.0015, "gauge_mm": 0.0015}
+
+
+@pytest.fixture(scope="module")
+def change_of() -> Any:
+    """The change at a reference by slips of encoders, motion of joints, and slips of gauges."""
+    cell = load_cell(bundled_config("simulated-hexaglide"))
+    reference = Pose(*cell.settings.identification.points[0])
+
+    def change(*, slip: Any = 0.0, moved: Any = 0.0, gauge: Any = 0.0, **noise: Any) -> Any:
+        stated = cell.settings.noise.model_copy(update={"revisits": noise.pop("revisits", 0)})
+        robot = robot_of(cell)
+        robot = replace(robot, noise=replace(robot.noise, **MEASURED | noise))
+        settings = cell.settings.model_copy(update={"noise": stated})
+        allowances = Allowances(settings, robot)
+        by_joints = allowances.ball_at(reference).by_joints
+        shift, ball = np.zeros(6) + moved, np.zeros(3) + gauge
+        now = np.concatenate([by_joints @ shift + ball, shift + slip])
+        return allowances.since(reference, np.zeros(9), now, readings=8)
+
+    return change
+
+
+def of_leg(leg: int, mm: float) -> Any:
+    return mm * np.eye(6)[leg]
+
+
+@pytest.mark.parametrize("leg", range(6))
+@pytest.mark.parametrize("mm", [0.05, -0.05, 0.3])
+def test_a_slip_of_any_encoder_is_found(change_of, leg: int, mm: float) -> None:
+    assert change_of(slip=of_leg(leg, mm)).slipped_encoder() == leg
+
+
+def test_one_that_slips_while_all_joints_scatter_is_found(change_of) -> None:
+    moved = 0.003 * np.random.default_rng(1).standard_normal(6)
+    found = change_of(slip=of_leg(4, 0.05), moved=moved, stops=0.003)
+    assert found.slipped_encoder() == 4
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"moved": of_leg(2, 0.05)},
+        {"moved": np.full(6, 0.2)},
+        {"gauge": 0.2 * np.eye(3)[1]},
+        {"slip": of_leg(2, 0.008)},
+        {"slip": of_leg(2, 0.05), "stops": 0.02},
+        {"slip": of_leg(2, 0.05), "walk_mm": 0.1},
+        {"slip": of_leg(2, 0.05), "revisits": 4},
+    ],
+    ids=[
+        "a joint",
+        "all joints",
+        "a gauge",
+        "noise",
+        "a machine that scatters",
+        "drift",
+        "not yet measured",
+    ],
+)
+def test_nothing_else_is_taken_for_a_slip(change_of, changed: Any) -> None:
+    """The limit is what this machine was measured to repeat by, not a number."""
+    assert change_of(**changed).slipped_encoder() is None

@@ -1,5 +1,6 @@
 """Addresses of networks and of serial ports, taken apart and judged in one place."""
 
+import encodings.idna  # noqa: F401 - a process that gave up rights may find it no longer
 import socket
 from contextlib import suppress
 from dataclasses import dataclass

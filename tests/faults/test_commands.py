@@ -22,6 +22,8 @@ from tests.faults.interception import Call, intercepted
 from tests.hexacell.services.proposed_runs import ProposedRun, a_cell, propose_run
 from tests.signals import terminal_signals
 
+pytestmark = pytest.mark.usefixtures("records_agree")
+
 EDIT = b"# edited by a person\n"
 WRITING = [*(("apply", at) for at in range(1, 45, 4)), *(("rollback", at) for at in range(1, 19, 3))]
 OTHERS = [*(("report", at) for at in range(1, 7, 2)), *(("schedule", at) for at in range(1, 14, 3))]

@@ -86,6 +86,6 @@ async def test_what_the_adapter_reports_is_told(raw, opened, monkeypatch, fault,
 
     bus: EncoderBus = opened._session.bus
     monkeypatch.setattr(bus.network.bus, "recv", recv)
-    bus._receiver.join(5.0)
+    bus._receiver.join()
     with pytest.raises(BusError, match=told):
         await opened.read()

@@ -25,6 +25,7 @@ from hexacell.cell.described_devices import DbcSettings
 from hexacell.cell.devices import EncoderSettings
 from hexacell.errors import DeviceError, FileError, UsageError, did_you_mean
 from hexacell.kinematics.parameters import JointUnit
+from hexacell.storage.atomic_files import require_size
 
 LENGTHS = {"mm": 1.0, "m": 1000.0, "cm": 10.0, "um": 0.001, "\u00b5m": 0.001, "\u03bcm": 0.001, "nm": 1e-6}
 ANGLES = {"deg": 1.0, "\u00b0": 1.0, "degree": 1.0, "rad": 57.29577951308232, "mrad": 0.05729577951308232}
@@ -65,6 +66,7 @@ def read_signals(settings: DbcSettings, unit: JointUnit, step: float) -> tuple[P
     ``UsageError`` without cantools.
     """
     cantools = optional("cantools", "dbc", "encoders")
+    require_size(Path(settings.file))
     try:
         with Path(settings.file).open("rb") as file:
             encoding = "utf-8-sig" if file.read(len(BOM_UTF8)) == BOM_UTF8 else None

@@ -21,6 +21,7 @@ from drivers.interfaces import DeviceIdentity
 from hexacell.cell.devices import EncoderSettings, LinearEncoderSettings, RotaryEncoderSettings
 from hexacell.errors import DeviceError, FileError
 from hexacell.kinematics.parameters import JointUnit
+from hexacell.storage.atomic_files import read_bytes
 
 STEP_OBJECTS = {"6005h": od.MEASURING_STEP_SETTING, "6501h": od.MEASURING_STEP}
 """Objects that a device may have its measuring step in."""
@@ -215,12 +216,7 @@ def read_data_sheet(path: Path) -> DataSheet:
     Raises:
         FileError: it cannot be read, says nothing of what a device is, or a value of these is no number.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig", errors="replace")  # names may be in any encoding
-    except OSError as error:
-        raise FileError(
-            f"cannot be read: {error.strerror}", subject=path, action="Correct eds under [encoders]"
-        ) from error
+    text = read_bytes(path).decode("utf-8-sig", errors="replace")  # names may be in any encoding
     lines, entries = _lines(text), (*WHAT_IT_IS.values(), *HOW_IT_IS_SET.values())
     values = {entry: value for entry in entries if (value := _default(lines, entry, path)) is not None}
     if not values.keys() & WHAT_IT_IS.values():

@@ -25,7 +25,7 @@ from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
-from hexacell.storage.atomic_files import write_own
+from hexacell.storage.atomic_files import read_bytes, write_own
 
 LONGEST_STEP_MM = 5.0
 """Longest step of a joint variable between two solutions of the pose: the assembly mode is kept."""
@@ -129,7 +129,7 @@ class FollowingPhysics(RobotPhysics):
     def _restore_gauges(self) -> None:
         """Put the gauges where they were, if that is known, and note from now on where they are put."""
         with suppress(OSError, FileError, ValueError, KeyError, TypeError):
-            kept = json.loads(self._kept.read_text())
+            kept = json.loads(read_bytes(self._kept))
             if kept["config"] == fingerprint(*self._config):
                 station, triad = np.array(kept["station"], float), np.array(kept["triad"], float)
                 self.gauges.stand(station.reshape(3), triad.reshape(3, 3))

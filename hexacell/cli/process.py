@@ -33,8 +33,7 @@ STOP_SIGNALS: tuple[int, ...] = tuple(
 ) + tuple(range(getattr(signal, "SIGRTMIN", 0), getattr(signal, "SIGRTMAX", -1) + 1))
 """Sent by a service manager, a script or a person, or when the terminal is closed; Windows has few.
 
-Unhandled, each ends the process where it is: a robot would go on with its move, unwatched. Those that tell
-of a fault of the process itself are left alone, as it could do nothing any more.
+Unhandled, each ends the process, and a robot would go on with its move, unwatched. Faults are left alone.
 """
 
 OVER_A_SOCKET = {"tui.main", "host.main"}
@@ -42,7 +41,9 @@ OVER_A_SOCKET = {"tui.main", "host.main"}
 
 
 @contextmanager
-def handled(numbers: Iterable[int], handler: Callable[[int, FrameType | None], object]) -> Iterator[None]:
+def handled(
+    numbers: Iterable[int], handler: Callable[[int, FrameType | None], object] | signal.Handlers
+) -> Iterator[None]:
     """Handle signals within this context.
 
     Python handles signals in the main thread only; elsewhere nothing changes.

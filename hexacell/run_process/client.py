@@ -13,6 +13,7 @@ from hexacell.errors import ExitCode, FileError, HexacellError
 from hexacell.python_process import python_command
 from hexacell.run_process import messages as protocol
 from hexacell.run_process.run_socket import peer_of
+from hexacell.storage.atomic_files import read_end
 from procedures.engine.commands import Command
 from procedures.steps import events
 
@@ -181,7 +182,6 @@ def _failure_in(answer: bytes, errors: BinaryIO) -> protocol.HostFailed:
         message = protocol.host_message(answer)
         if isinstance(message, protocol.HostFailed):
             return message
-    errors.seek(0)
-    words = errors.read().decode(errors="replace").strip().splitlines()
+    words = read_end(errors, 4096).splitlines()
     problem = words[-1] if words else "its process ended without a word"
     return protocol.HostFailed(problem=f"the run could not begin: {problem}", exit_code=int(ExitCode.FAULT))

@@ -31,10 +31,9 @@ import os
 import socket
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from weakref import WeakSet
 
 from hexacell.errors import CellBusy, FileError
 from hexacell.storage import atomic_files
@@ -44,10 +43,6 @@ _log = logging.getLogger(__name__)
 _LONGEST_NOTE = 4096
 _MODE = 0o644
 _UNKNOWN = "another process"
-_WITHOUT_FILE = "another process, whose lock file was deleted"
-_LOCKS = Path("/proc/locks")
-_SOCKETS = Path("/proc/net/unix")
-_NAMES: WeakSet[socket.socket] = WeakSet()
 # O_NOFOLLOW: in a shared folder a link must not turn the holder's note into a write to another file.
 # O_NONBLOCK: a pipe in the place of the file would be waited for.
 _FLAGS = os.O_NOFOLLOW | os.O_NONBLOCK
@@ -70,29 +65,26 @@ def cell_lock(*config: Path) -> Iterator[None]:
 @contextmanager
 def _lock_of_file(config: Path) -> Iterator[None]:
     descriptor = _open(lock_path(config))
-    named = None
     try:
         _acquire(descriptor, config)
-        named = _name_in_kernel(config)
         since = datetime.now(UTC).astimezone().isoformat(timespec="seconds")  # local time
         holder = {"pid": os.getpid(), "user": user_name(), "host": socket.gethostname(), "since": since}
-        _note(descriptor, json.dumps(holder) + "\n")
-        _log.info("this process holds the cell of %s", config)
         try:
-            yield
+            with _name_in_kernel(config):
+                _note(descriptor, json.dumps(holder) + "\n")
+                _log.info("this process holds the cell of %s", config)
+                yield
         finally:
             _log.info("this process releases the cell of %s", config)
             _note(descriptor, "")
             # Explicit, because a forked child may still have the descriptor open.
             fcntl.flock(descriptor, fcntl.LOCK_UN)
     finally:
-        if named is not None:
-            named.close()
         os.close(descriptor)
 
 
 def lock_holder(config: Path) -> str | None:
-    """Who holds the cell, by the note in its lock; None if nobody does, or none is known.
+    """Who holds the cell, by the note in its lock; None if nobody does, or could not leave one.
 
     The lock itself is not tried: who takes it at that moment would find it held.
 
@@ -103,56 +95,35 @@ def lock_holder(config: Path) -> str | None:
     try:
         descriptor = os.open(path, _FLAGS | os.O_RDONLY)
     except FileNotFoundError:
-        return _deleted_holder(config)
+        return None
     except OSError as error:
         raise _cannot_open(path, error) from error
     try:
         holder = _holder(descriptor)
     finally:
         os.close(descriptor)
-    return _deleted_holder(config) if holder == _UNKNOWN else holder
+    return None if holder == _UNKNOWN else holder
 
 
-def _address(config: Path) -> str:
-    """The name in the kernel by which the holder of a config is known: its folder, and its name there."""
+def _name_in_kernel(config: Path) -> AbstractContextManager[object]:
+    """Hold the cell's name where the system has such names; raises ``CellBusy`` if it is taken."""
     target = Path(os.path.realpath(config))
     folder = target.parent.stat()
-    place = f"{folder.st_dev}:{folder.st_ino}:{target.name}"
-    return f"hexacell-cell-{atomic_files.sha256(os.fsencode(place))}"
-
-
-def _deleted_holder(config: Path) -> str | None:
-    """Whoever has the cell's name in the kernel, but no note: its lock file was deleted."""
-    with suppress(OSError):
-        if f"@{_address(config)}" in _SOCKETS.read_text(errors="replace").split():
-            return _WITHOUT_FILE
-    return None
-
-
-def _name_in_kernel(config: Path) -> socket.socket | None:
-    """Take the cell's name; None where the system has no such names. Raises ``CellBusy`` if it is taken."""
-    if sys.platform != "linux":
-        return None
+    place = os.fsencode(f"{folder.st_dev}:{folder.st_ino}:{target.name}")
     named = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     try:
-        named.bind(f"\0{_address(config)}")
+        if sys.platform == "linux":
+            named.bind(f"\0hexacell-cell-{atomic_files.sha256(place)}")
     except OSError as error:
         named.close()
         if error.errno != errno.EADDRINUSE:
-            return None
-        action = "Wait until that has ended, or stop it"
-        problem = f"the cell is in use by {_WITHOUT_FILE}"
-        raise CellBusy(problem, subject=config, action=action) from error
-    _NAMES.add(named)
+            return nullcontext()
+        raise CellBusy(
+            "the cell is in use by another process, whose lock file was deleted",
+            subject=config,
+            action="Wait until that has ended, or stop it",
+        ) from error
     return named
-
-
-def _leave_names_to_parent() -> None:
-    for named in list(_NAMES):
-        named.close()
-
-
-os.register_at_fork(after_in_child=_leave_names_to_parent)
 
 
 def lock_path(config: Path) -> Path:
@@ -193,7 +164,7 @@ def _acquire(descriptor: int, config: Path) -> None:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             raise CellBusy(
-                f"the cell is in use by {_any_holder(descriptor)}",
+                f"the cell is in use by {_holder(descriptor)}",
                 subject=config,
                 action="Wait until that has ended, or stop it",
             ) from error
@@ -205,19 +176,6 @@ def _note(descriptor: int, text: str) -> None:
     with suppress(OSError):
         os.pwrite(descriptor, data, 0)
         os.ftruncate(descriptor, len(data))
-
-
-def _any_holder(descriptor: int) -> str:
-    """The holder by its note or, of a program that left none, by the kernel's list of locks."""
-    if (holder := _holder(descriptor)) != _UNKNOWN:
-        return holder
-    with suppress(OSError):
-        place = f":{os.fstat(descriptor).st_ino}"
-        for line in _LOCKS.read_text().splitlines():
-            words = line.split()  # number, FLOCK, ADVISORY, WRITE, process, device:inode, from, to
-            if len(words) > 5 and words[1] == "FLOCK" and words[5].endswith(place):
-                return f"{_UNKNOWN} ({words[4]}), which left no name in the lock file"
-    return _UNKNOWN
 
 
 def _holder(descriptor: int) -> str:

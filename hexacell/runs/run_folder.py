@@ -16,7 +16,7 @@ from pydantic import TypeAdapter, ValidationError
 from hexacell.cell.fields import Frozen, Name, first_mistake
 from hexacell.cell.loader import Cell
 from hexacell.errors import FileError, UsageError
-from hexacell.storage.atomic_files import create_folder_durably, os_errors, read_text, write_own
+from hexacell.storage.atomic_files import create_folder_durably, os_errors, read_bytes, read_text, write_own
 from hexacell.storage.output_files import RUN_JOURNAL
 
 JOURNAL = RUN_JOURNAL
@@ -115,8 +115,9 @@ def run_folders(cell: Cell) -> list[RunFolder]:
 def runs_folder_of_unreadable(path: Path) -> Path | None:
     """Where the runs of the cell file at ``path``, which has mistakes, are; None if its name is unknown."""
     every = path.parent / "runs"
-    with suppress(OSError, ValidationError):
-        return every / TypeAdapter(Name).validate_python(_stated_name(path.read_text(errors="replace")))
+    with suppress(FileError, ValidationError):
+        text = read_bytes(path).decode(errors="replace")
+        return every / TypeAdapter(Name).validate_python(_stated_name(text))
     present = [one for one in every.glob("*") if one.is_dir()]
     return present[0] if len(present) == 1 else None
 

@@ -11,6 +11,7 @@ from textual.binding import Binding
 from textual.theme import Theme
 
 from hexacell.errors import FileError, did_you_mean
+from hexacell.storage.atomic_files import decode_utf8, read_if_present
 
 # Primary, secondary, warning, error, success, accent, foreground, background, surface, panel.
 _DARK = ("#7aa2f7", "#9ece6a", "#e0af68", "#f7768e", "#9ece6a", "#e0af68", "#d5daf0", "#16181f", "#1d2029")
@@ -107,10 +108,8 @@ def read_preferences(path: Path) -> ScreenPreferences:
         FileError: it cannot be read, names an unknown action or theme, or one key for several actions.
     """
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        return ScreenPreferences()
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        content = tomllib.loads(decode_utf8(read_if_present(path) or b"", path))
+    except tomllib.TOMLDecodeError as error:
         raise FileError(f"it cannot be read: {error}", subject=path, action="Correct it") from error
     keys, theme = content.get("keys", {}), content.get("theme", THEMES[0])
     _require_keys(keys, path)

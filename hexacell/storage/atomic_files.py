@@ -19,6 +19,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
+from typing import BinaryIO
 
 from hexacell.errors import FileError
 
@@ -27,6 +28,9 @@ NOT_FOR_OTHERS = 0o002
 
 FOR_EVERYBODY = 0o444
 """To be read by everybody."""
+
+LARGEST_BYTES = 200_000_000
+"""Most bytes of any file that is read as a whole: no run and no history comes near it."""
 
 BYTE_ORDER_MARK = "\ufeff"
 
@@ -52,11 +56,37 @@ def sha256(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def read_bytes(path: Path) -> bytes:
-    """The content of a regular file; a pipe or a device is refused, as reading it could block."""
+def require_size(path: Path, largest_bytes: int = LARGEST_BYTES) -> None:
+    """Make sure of a regular file that may be read as a whole, before any of it is; raises ``FileError``.
+
+    A pipe or a device is refused, as reading it could block.
+    """
     with os_errors("cannot be read", path):
-        _require_regular(path, path.stat())
-        return path.read_bytes()
+        status = path.stat()
+    _require_regular(path, status)
+    require_length(path, status.st_size, largest_bytes)
+
+
+def require_length(path: Path, length: int, largest_bytes: int = LARGEST_BYTES) -> None:
+    """Raise ``FileError`` if a file of so many bytes is not read."""
+    if length > largest_bytes:
+        size = f"{length / 1e6:.1f} MB, and at most {largest_bytes / 1e6:g} MB are read"
+        raise FileError(f"is too large: {size}", subject=path, action="Name another file, or split it")
+
+
+def read_bytes(path: Path, largest_bytes: int = LARGEST_BYTES) -> bytes:
+    """The content of a regular file that is not larger than that; raises ``FileError``."""
+    require_size(path, largest_bytes)
+    with os_errors("cannot be read", path), path.open("rb") as stream:
+        data = stream.read(largest_bytes + 1)
+    require_length(path, len(data), largest_bytes)  # it may have grown
+    return data
+
+
+def read_end(stream: BinaryIO, most_bytes: int) -> str:
+    """The end of what programs said, as text; they may have said any amount."""
+    stream.seek(-min(most_bytes, stream.seek(0, os.SEEK_END)), os.SEEK_END)
+    return stream.read(most_bytes).decode(errors="replace").strip()
 
 
 def read_if_present(path: Path) -> bytes | None:
@@ -69,17 +99,13 @@ def read_if_present(path: Path) -> bytes | None:
     return read_bytes(path)
 
 
-def read_text(path: Path, largest_bytes: int | None = None) -> str:
+def read_text(path: Path, largest_bytes: int = LARGEST_BYTES) -> str:
     """The content of a UTF-8 file, with its line ends but no byte order mark.
 
     Raises:
         FileError: it cannot be read, is no text, or is larger than ``largest_bytes``.
     """
-    data = read_bytes(path)
-    if largest_bytes is not None and len(data) > largest_bytes:
-        size = f"{len(data) / 1e6:.1f} MB, and at most {largest_bytes / 1e6:g} MB are read"
-        raise FileError(f"is too large: {size}", subject=path, action="Name another file, or split it")
-    return decode_utf8(data, path).removeprefix(BYTE_ORDER_MARK)
+    return decode_utf8(read_bytes(path, largest_bytes), path).removeprefix(BYTE_ORDER_MARK)
 
 
 def decode_utf8(data: bytes, path: Path) -> str:
@@ -118,7 +144,8 @@ def write_atomically(
             mode = 0o666 if like is None else stat.S_IMODE(like.stat().st_mode)
             new_mode = mode & 0o666 & ~NOT_FOR_OTHERS
             _write_like(target, temporary, data, new_mode, for_everybody=for_everybody)
-            if expected is not None and target.read_bytes() != expected:
+            is_size_right = expected is None or target.stat().st_size == len(expected)
+            if expected is not None and not (is_size_right and target.read_bytes() == expected):
                 raise FileError(
                     "the file was changed by somebody else just now and is left unchanged",
                     subject=target,

@@ -138,7 +138,7 @@ def _known(path: Path, kept: TypeAdapter[_Kept[ResultType]]) -> dict[str, Result
     """The results that were kept; a last line that was not finished is computed again."""
     if not path.exists():
         return {}
-    *lines, rest = path.read_text(encoding="utf-8").split("\n")
+    *lines, rest = atomic_files.read_text(path).split("\n")
     found = {}
     for number, line in enumerate(lines, start=1):
         try:

@@ -260,6 +260,7 @@ def _parse(path: Path, stream: BinaryIO, longest_line: int = LONGEST_LINE) -> tu
     state = os.fstat(stream.fileno())
     if not stat.S_ISREG(state.st_mode):
         raise FileError("this is not a file", subject=path, action="Check the path")
+    atomic_files.require_length(path, state.st_size)
 
     def most() -> int:
         # What another process appends meanwhile is not read: half a line and then more would look damaged.

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from hexacell.cli.console import Console
+from hexacell.cli.process import handled
 from hexacell.cli.terminal import ENDING_SIGNALS, SignalCommands
 from hexacell.errors import Interruption
 from procedures.engine.commands import Abort, Command, Stop
@@ -75,22 +76,16 @@ def test_the_first_signal_stops_and_a_second_ctrl_c_aborts(signals, numbers, com
 
 @pytest.mark.parametrize("number", ENDING_SIGNALS, ids=str)
 def test_no_signal_ends_or_suspends_a_run_without_a_word(signals, number: int) -> None:
-    former = signal.signal(number, signal.SIG_DFL)  # this test run may use it
-    try:
+    with handled([number], signal.SIG_DFL):  # this test run may use it
         assert signals.run(commands_after(signals, number)) == [STOP]
-    finally:
-        signal.signal(number, former)
 
 
 def test_every_signal_that_would_end_a_process_is_heeded_or_has_a_reason() -> None:
-    cannot_be = {signal.SIGKILL, signal.SIGSTOP}
-    faults = {
-        getattr(signal, f"SIG{name}") for name in ["ABRT", "BUS", "FPE", "ILL", "SEGV", "SYS", "TRAP"]
-    }
-    harmless = {getattr(signal, f"SIG{name}") for name in ["CHLD", "CONT", "URG", "WINCH"]}
-    ignored_by_python = {signal.SIGPIPE, signal.SIGXFSZ}
+    faults = {signal.SIGABRT, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGSEGV, signal.SIGSYS}
+    harmless = {signal.SIGCHLD, signal.SIGCONT, signal.SIGURG, signal.SIGWINCH, signal.SIGTRAP}
+    by_others = {signal.SIGKILL, signal.SIGSTOP, signal.SIGPIPE, signal.SIGXFSZ}  # the kernel, Python
     of_the_shell = {signal.SIGTTIN, signal.SIGTTOU}  # a job in the background asks for the terminal
-    known = {*ENDING_SIGNALS, *cannot_be, *faults, *harmless, *ignored_by_python, *of_the_shell}
+    known = {*ENDING_SIGNALS, *faults, *harmless, *by_others, *of_the_shell}
     assert set(signal.Signals) - known == set()
 
 

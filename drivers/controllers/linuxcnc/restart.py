@@ -29,7 +29,7 @@ from typing import Self
 
 from hexacell.errors import HexacellError, UsageError
 from hexacell.printable import printable
-from hexacell.storage.atomic_files import require_no_link
+from hexacell.storage.atomic_files import read_end, require_no_link
 
 LOCK = Path("/tmp/linuxcnc.lock")  # noqa: S108 - LinuxCNC's own, there from its start to its end
 LOG = "linuxcnc.log"
@@ -165,7 +165,8 @@ def restart(ini: Path, ended_s: float = ENDED_S, poll_s: float = POLL_S) -> subp
     answer = "LinuxCNC does not answer"
     _wait(lambda: configured.greets() or started.poll() is not None, STARTED_S, poll_s, answer)
     if started.poll() is not None:
-        said = log.read_text(errors="replace").strip()[-SHOWN_CHARACTERS:]
+        with log.open("rb") as output:
+            said = read_end(output, SHOWN_CHARACTERS)
         raise UsageError(f"LinuxCNC ended at once: {said}", action=f"Look at {log}")
     return started
 

@@ -16,6 +16,7 @@ from drivers.controllers.linuxcnc.protocol import Timeouts, loop_time, parse_num
 from drivers.errors import CommandRefused, MotionInterrupted
 from drivers.interfaces import StartupAction
 from hexacell.errors import DeviceError
+from hexacell.storage.atomic_files import read_end
 
 Stopped = Callable[[], bool]
 
@@ -240,6 +241,5 @@ async def run_reload_command(command: tuple[str, ...], subject: str, timeout_s: 
                 process.kill()
                 await process.wait()
         if status != 0:
-            output.seek(0)
-            said = output.read().decode("utf-8", "replace").strip()[-_SHOWN_CHARACTERS:]
+            said = read_end(output, _SHOWN_CHARACTERS)
             raise failure(f"failed with status {status}" + (f": {said}" if said else ""))

@@ -37,6 +37,7 @@ from hexacell.services.unattended.schedules import (
     write_schedule,
 )
 from hexacell.services.unattended.unattended_runs import local_now, refuse_quiet_hours, refused_start
+from hexacell.storage.atomic_files import read_text
 from hexacell.text.layout import duration, wrapped
 from procedures.steps import events
 
@@ -251,7 +252,7 @@ def _schedule_text(schedule: Schedule | None, *, is_removed: bool) -> str:
     if schedule is None:
         return "This cell has no schedule."
     if not is_removed:
-        return "\n".join(f"{path}\n{path.read_text()}" for path in schedule.files).rstrip()
+        return "\n".join(f"{path}\n{read_text(path)}" for path in schedule.files).rstrip()
     control = _control(schedule)
     stop = f"  {control} stop {schedule.unit}.timer && {control} daemon-reload"
     return "\n".join([*(f"removed {path}" for path in schedule.files), "To put it in force:", stop])

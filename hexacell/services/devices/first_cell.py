@@ -20,6 +20,7 @@ from hexacell.errors import FileError, HexacellError, flatten_errors
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.plugins import Group, created, names
 from hexacell.services.offline import require_stated_poses
+from hexacell.storage.atomic_files import read_text
 from hexacell.storage.output_files import NEW_CELL, OutputFile
 from hexacell.storage.toml_document import KeyPath, TomlDocument
 
@@ -203,7 +204,7 @@ class CellDraft:
 
     def _text(self, given: dict[str, str]) -> str:
         """The file; raises ``ValueError`` where an answer cannot be read."""
-        bundled: Document = tomllib.loads(bundled_config("simulated-hexaglide").read_text())
+        bundled: Document = tomllib.loads(read_text(bundled_config("simulated-hexaglide")))
         document: Document = {
             "version": 1,
             "name": "",

@@ -20,7 +20,7 @@ from hexacell.noise.measured_noise import MeasuredNoise
 from hexacell.robot.model import Robot, make_robot
 from hexacell.runs.run_folder import RunFolder, run_folders
 from hexacell.services.history.journal_soundness import read_sound
-from procedures.journal.journal import decode
+from procedures.journal.journal import LONGEST_LINE, decode
 from procedures.run.state import RunState
 from procedures.steps.events import RunStarted
 
@@ -104,7 +104,7 @@ def _last(cell: Cell) -> tuple[str, dict[str, DeviceIdentity]]:
     """The name of the last run whose first event can be read, and the devices with which it began."""
     for run in reversed(run_folders(cell)):
         with suppress(OSError, HexacellError), run.journal.open("rb") as journal:
-            entry = decode(journal.readline(), run.journal, 1)
+            entry = decode(journal.readline(LONGEST_LINE), run.journal, 1)
             if entry is not None and isinstance(entry.event, RunStarted) and entry.event.devices:
                 return run.name, {one.name: one for one in entry.event.devices}
     return "", {}

@@ -169,19 +169,13 @@ async def _run(
     broker = QuestionBroker(request.operator)
     recovery = cell.settings.recovery
     policy = recovery.unattended if request.unattended else recovery.attended
+    executor = StepExecutor(
+        cell, calibration, connected.devices, connected.clock, broker, folder, connected.thermometers
+    )
     try:
         with Journal(folder.journal) as journal:
             remove_stale_temporaries(folder.path)
-            executor = StepExecutor(
-                cell,
-                calibration,
-                connected.devices,
-                connected.clock,
-                broker,
-                folder,
-                connected.thermometers,
-                require_evidence=journal.require_read_back,
-            )
+            executor = replace(executor, require_evidence=journal.require_read_back)
             engine = Engine(executor, journal, listeners, queue=queue, broker=broker, policy=policy)
             if on_engine is not None:
                 on_engine(engine, connected.devices)

@@ -14,7 +14,7 @@ from hexacell.runs.cell_lock import cell_lock, lock_path
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.devices.device_setup import device_addresses
 from hexacell.services.run.calibration_run import RunRequest
-from hexacell.storage.atomic_files import create_folder_durably, os_errors, write_own
+from hexacell.storage.atomic_files import create_folder_durably, os_errors, read_bytes, write_own
 from procedures.calibration.calibration import Mode
 from procedures.engine.commands import UnattendedOperator
 
@@ -88,7 +88,7 @@ def _copy_cell(cell_file: Path, folder: Path) -> Path:
     create_folder_durably(folder)
     write_own(folder / MARKER, b"made by hexacell demo, which replaces this folder\n")
     for source in cell_file.parent.glob(f"{cell_file.stem}*.toml"):
-        write_own(folder / source.name, source.read_bytes())
+        write_own(folder / source.name, read_bytes(source))
     return folder / cell_file.name
 
 

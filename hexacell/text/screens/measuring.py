@@ -33,6 +33,7 @@ AFTER_COMPUTING = {
 
 PACE_RECORDS = 8
 """Number of the latest records whose pace gives the time that is left."""
+RESUMED_THERE = "2 Preflight resumes it with r; what was measured is kept"
 RESUMABLE = "What was measured is kept. Mend it, then press r in 2 Preflight, which resumes the run."
 
 
@@ -93,7 +94,8 @@ def _following(picture: RunPicture, settings: CellSettings | None) -> str:
     if picture.state.ended is not None:
         return "look at 4 Review; 5 History has all runs"
     if picture.status is Status.ENDED:
-        return _after_early_end(picture.setback)
+        is_lost = isinstance(picture.setback, HostFailed) and picture.setback.evidence_lost
+        return "2 Preflight begins a new run" if is_lost else RESUMED_THERE
     if picture.status is Status.PAUSED:
         return "it goes on where it was when you press p"
     if at is None or (step is not None and step.moves_nothing):
@@ -101,12 +103,6 @@ def _following(picture: RunPicture, settings: CellSettings | None) -> str:
     if isinstance(step, Place):
         return "the reference is read, then the gauges are tried by small moves"
     return _after_set(picture.state, at, settings)
-
-
-def _after_early_end(setback: Setback | None) -> str:
-    if isinstance(setback, HostFailed) and setback.evidence_lost:
-        return "2 Preflight begins a new run"
-    return "2 Preflight resumes it with r; what was measured is kept"
 
 
 def _after_set(state: RunState, at: SetKey, settings: CellSettings | None) -> str:

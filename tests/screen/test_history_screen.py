@@ -30,6 +30,9 @@ from tests.screen.test_job import press, shown, until_shown
 from tests.waiting import until
 
 
+pytestmark = pytest.mark.usefixtures("records_agree")
+
+
 class WithoutDevices(Workplace):
     """The cell itself; its devices are not there."""
 

@@ -29,7 +29,6 @@ from tests.screen.conftest import attended, settled
 from tests.screen.test_job import press, shown, until_shown
 from tests.waiting import until
 
-
 pytestmark = pytest.mark.usefixtures("records_agree")
 
 

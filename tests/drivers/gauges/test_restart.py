@@ -14,6 +14,7 @@ from drivers.serial.modbus_port import ModbusPort
 from hexacell.cell.devices import GaugeSettings, LinearEncoderSettings
 from hexacell.plugins import Group, load
 from tests.drivers.simulated.gauges.served.cell import DESCRIBED, DISPLAYS, PROTOCOLS, cell
+from tests.waiting import until
 
 RESTART_S = 0.1
 LATENCY_S = 0.03
@@ -70,6 +71,14 @@ async def test_a_search_gives_microcontrollers_their_time():
 
 async def test_modbus_encoders_are_asked_again_too(monkeypatch):
     monkeypatch.setattr(ModbusPort, "_clear", lambda _self: None)  # nothing comes late here
+    asked: list[bytes] = []
+    ask = ModbusPort._exchange_once
+
+    def counted(port, request, *others):
+        asked.append(request)
+        return ask(port, request, *others)
+
+    monkeypatch.setattr(ModbusPort, "_exchange_once", counted)
     modbus = {"registers": (0, 2, 4, 6, 8, 10)}
     settings = LinearEncoderSettings.model_validate(
         {"protocol": "modbus", "modbus": modbus, "timeout_s": 0.05}
@@ -78,7 +87,7 @@ async def test_modbus_encoders_are_asked_again_too(monkeypatch):
         twin.inject("silent", on=True)
         bank = ModbusBank(twin.settings)
         opening = asyncio.create_task(bank.open())
-        await asyncio.sleep(0.1)
+        await until(lambda: len(asked) > 1)
         twin.inject("silent", on=False)
         assert len(await opening) == 6
         await bank.close()

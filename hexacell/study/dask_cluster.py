@@ -51,8 +51,12 @@ def dask_cluster(address: str, *, patience_s: float = PATIENCE_S) -> NewExecutor
     Raises:
         UsageError: this is not an address of a scheduler.
     """
-    scheduler = address_of(address)
-    if scheduler.scheme not in {"tcp", "tls"} or not scheduler.host or scheduler.port is None:
+    try:
+        named = address_of(address)
+        is_one = named.scheme in {"tcp", "tls"} and bool(named.host) and named.port is not None
+    except UsageError:
+        is_one = False
+    if not is_one:
         raise UsageError(f"'{address}' is not an address of a Dask scheduler", action="Try tcp://HOST:8786")
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # the errors here say it in plain words

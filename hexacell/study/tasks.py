@@ -17,6 +17,7 @@ from typing import Generic, TypeVar, cast
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from hexacell.errors import FileError, HexacellError
+from hexacell.plugins import plugin_failures_named
 from hexacell.python_process import keep_working_folder_out_of_workers
 from hexacell.storage import atomic_files
 
@@ -80,12 +81,18 @@ def results_of(
             )
 
 
+def _carried_out(carry_out: Callable[[TaskType], ResultType], task: TaskType) -> ResultType:
+    """The result, in the process of a worker: another one would learn only the text of what failed."""
+    with plugin_failures_named():
+        return carry_out(task)
+
+
 def _until_broken(
     left: Iterable[TaskType], carry_out: Callable[[TaskType], ResultType], new_executor: NewExecutor
 ) -> Iterator[tuple[TaskType, ResultType]]:
     executor = new_executor()
     try:
-        begun = {executor.submit(carry_out, task): task for task in left}
+        begun = {executor.submit(_carried_out, carry_out, task): task for task in left}
         for future in as_completed(begun):
             yield begun[future], future.result()
     except BrokenExecutor:

@@ -2,9 +2,11 @@
 
 import asyncio
 import json
+import pickle
 import re
 import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
@@ -17,6 +19,7 @@ from hexacell.cli import app
 from hexacell.cli.commands import cell
 from hexacell.errors import DeviceError, ExitCode, UsageError
 from hexacell.plugins import Group, PluginFailed
+from hexacell.study.tasks import results_of
 
 Install = Callable[..., None]
 
@@ -163,3 +166,10 @@ def test_a_command_ends_with_it(install: Install, capsys, monkeypatch) -> None:
         "hexacell: laser_n 1.0: this plug-in failed in laser_n.Laser.find: KeyError"
     )
     assert json.loads(captured.out)["exit_code"] == ExitCode.HARDWARE
+
+
+def test_a_task_of_a_study_is_named_where_it_is_carried_out(laser) -> None:
+    with ThreadPoolExecutor(1) as pool, pytest.raises(PluginFailed, match=r"laser_k\.Laser\._parsed"):
+        list(results_of([()], laser("sound")._parsed, lambda: pool))
+    failed = PluginFailed("failed", subject="laser_k 1.0", action="Report it")
+    assert str(pickle.loads(pickle.dumps(failed))) == str(failed)

@@ -25,9 +25,20 @@ from tests.signals import terminal_signals
 pytestmark = pytest.mark.usefixtures("records_agree")
 
 EDIT = b"# edited by a person\n"
-WRITING = [*(("apply", at) for at in range(1, 45, 4)), *(("rollback", at) for at in range(1, 19, 3))]
-OTHERS = [*(("report", at) for at in range(1, 7, 2)), *(("schedule", at) for at in range(1, 14, 3))]
-AT_CALLS = pytest.mark.parametrize(("name", "at"), WRITING + OTHERS)
+
+
+def calls(name: str, last: int, step: int) -> list[Any]:
+    """A command and the numbers of its calls; of these every fourth is in the sample."""
+    numbers = range(1, last, step)
+    return [
+        pytest.param(name, at, marks=pytest.mark.slow if nth % 4 else ()) for nth, at in enumerate(numbers)
+    ]
+
+
+WRITING = calls("apply", 45, 4) + calls("rollback", 19, 3)
+AT_CALLS = pytest.mark.parametrize(
+    ("name", "at"), WRITING + calls("report", 7, 2) + calls("schedule", 14, 3)
+)
 
 
 class WrongClock(datetime):

@@ -21,6 +21,7 @@ from hexacell.cli.console import Console
 from hexacell.cli.process import fault_line, log
 from hexacell.printable import printable
 from hexacell.screen.widgets import RowList, TextPanel
+from hexacell.storage.output_files import LOG, OutputFile
 from hexacell.text.report.pages import html_of
 from procedures.journal.journal import encode, read_entries
 from procedures.steps import events
@@ -71,7 +72,7 @@ def test_no_notice_page_or_metric_has_any(text) -> None:
 
 def test_no_log_or_report_of_a_fault_has_any(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    with log(tmp_path / "log", 0):
+    with log(OutputFile(tmp_path / "log", LOG), 0):
         logging.getLogger("hexacell.x").warning("%s", HOSTILE, exc_info=ValueError(HOSTILE))
     line = fault_line(ValueError(HOSTILE), ["status", HOSTILE])
     for path in (tmp_path / "log", Path(line.rpartition(" ")[2])):

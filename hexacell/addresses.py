@@ -13,7 +13,6 @@ SERIAL_SCHEMES = ("socket", "rfc2217", "loop")
 """URLs of pyserial that may be named; others of it write files, or search for a port by a pattern."""
 
 WITHOUT_HOST = ("loop",)
-LARGEST_PORT = 65535
 METADATA = frozenset(map(ip_address, ("fd00:ec2::254", "fd20:ce::254", "100.100.100.200")))
 """Where clouds tell a computer its secrets, beyond the link-local addresses."""
 

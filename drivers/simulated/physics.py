@@ -283,7 +283,7 @@ class RobotPhysics:
             return float(displacement[AXES.index(axis)] + flicker)
 
     def _draw_noise(self) -> None:
-        """Of the next stop; the mounts of the gauges have drifted since the last one."""
+        """Draw the noise of the next stop; the mounts of the gauges have drifted since the last one."""
         minutes, self._walked_s = (self._clock.now() - self._walked_s) / 60.0, self._clock.now()
         step_mm = 1e-3 * self._settings.gauges.drift_um * np.sqrt(max(0.0, minutes))
         self._walked_mm = self._walked_mm + step_mm * self._random_walk.standard_normal(3)

@@ -193,7 +193,7 @@ def validated(document: TomlDocument, model: type[SectionType], path: Path) -> S
         settings = model.model_validate_json(document.to_json(), strict=True)
     except ValidationError as refusal:
         errors |= diagnosis.explain_refusal(refusal)
-    except UsageError:  # a date is the name of no mechanism, and has its error already
+    except UsageError:  # a date is not a valid name, and has its error already
         if not errors:
             raise
     if errors:

@@ -170,7 +170,7 @@ class _NoiseAssessment:
         return np.hypot(sigma, np.where(matters, readings, 0.0)) if readings else sigma
 
     def _readings_exceed(self, sigma: Array) -> Mask:
-        """Of which instruments (9,) the readings alone make a record noisier than ``sigma`` (9,)."""
+        """The instruments (9,) whose readings alone make a record noisier than ``sigma`` (9,)."""
         if not self.reading_noise:
             return np.zeros(INSTRUMENTS, dtype=bool)
         count, significance = self.readings.window_readings, SIGNIFICANCE / INSTRUMENTS

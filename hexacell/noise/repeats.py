@@ -109,7 +109,7 @@ class Repeats:
 
     @cached_property
     def chi2(self) -> float:
-        """Of all changes under the noise that is counted with."""
+        """The chi-square of all changes under the noise that is counted with."""
         return float(np.sum(self._chi_squares))
 
     def applied_to(self, noise: Noise) -> Noise:

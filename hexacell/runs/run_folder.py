@@ -19,7 +19,6 @@ from hexacell.errors import FileError, UsageError
 from hexacell.storage.atomic_files import create_folder_durably, os_errors, read_bytes, read_text, write_own
 from hexacell.storage.output_files import RUN_JOURNAL
 
-JOURNAL = RUN_JOURNAL
 CELL_FILE = "cell.toml"
 MEASUREMENTS = "measurements.csv"
 RESULT = "result.json"
@@ -46,7 +45,7 @@ class RunFolder:
     @property
     def journal(self) -> Path:
         """The run itself; all else can be derived from it."""
-        return self.path / JOURNAL
+        return self.path / RUN_JOURNAL
 
     @property
     def cell_file(self) -> Path:
@@ -255,7 +254,7 @@ def folder_stamps(folder: Path) -> dict[str, str]:
     """
     with os_errors("cannot be read", folder), suppress(FileNotFoundError), os.scandir(folder) as found:
         runs = [one for one in found if one.is_dir() and not one.name.startswith(".")]
-        return {one.name: f"{_times(one.path)} {_times(f'{one.path}/{JOURNAL}')}" for one in runs}
+        return {one.name: f"{_times(one.path)} {_times(f'{one.path}/{RUN_JOURNAL}')}" for one in runs}
     return {}
 
 

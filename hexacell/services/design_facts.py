@@ -48,7 +48,7 @@ NEARLY_ALL = 0.9
 """Share of the stated poses that a design without the mistake can take."""
 
 POINTS_SHARE = 5e-3
-"""Share of the largest length of the drawing below which all points are none in millimetres."""
+"""Share of the largest length of the drawing below which all points are not in millimetres."""
 
 SMALLEST_MACHINE_MM = 10.0
 """A drawing whose lengths are all smaller is not in millimetres."""

@@ -26,7 +26,7 @@ MOST = 0.5
 DEG_PER_RAD = float(np.degrees(1.0))
 
 SMALL_SHARE = 0.02
-"""Share of the largest length of the drawing below which limits are none in millimetres."""
+"""Share of the largest length of the drawing below which limits are not in millimetres."""
 
 CHANCE_OF_RADIANS = 2e-3
 """Chance of angles that are degrees to be round ones if they were radians; of one limit it is larger."""

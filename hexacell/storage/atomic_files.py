@@ -166,7 +166,7 @@ def require_no_link(path: Path) -> None:
     """Raise ``FileError`` if a file of the program's own is a link."""
     with os_errors("cannot be written and is unchanged", path):
         if path.is_symlink():
-            raise FileError("is a link, and none may be here", subject=path, action="Remove it")
+            raise FileError("is a link, which is not allowed here", subject=path, action="Remove it")
 
 
 def require_replaceable(path: Path) -> None:

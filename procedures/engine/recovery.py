@@ -214,7 +214,7 @@ class Reversal:
         if not is_result or not isinstance(error, HexacellError) or may_still_move(error):
             return error
         undone = "the new geometry was written and could not be verified; the old config is back."
-        if is_evidence_lost(error):  # no journal says so: it can be resumed by none
+        if is_evidence_lost(error):  # no journal says so: it cannot be resumed
             return WriteBackUndone(f"{undone} {error.cause}", action="Begin a new run")
         return WriteBackUndone(f"{undone} {error}")
 

@@ -120,7 +120,7 @@ class Year:
         return FIRST_NIGHT + timedelta(days=number)
 
     def true_error_mm(self, number: int) -> float:
-        """The largest position error at the task poses with the config of now, best frames taken off."""
+        """The largest position error at the task poses with the current config, best frames taken off."""
         robot = robot_of(self.cell)
         calibration = Calibration(self.cell.settings, robot, Mode.OPTIMISE, effort=FEW_CHOICES)
         jacobian = calibration.plan.task.jacobian(robot.belief())

@@ -47,7 +47,7 @@ def late_moments() -> list[Moment]:
 
 
 def seconds_of(moment: Moment) -> float:
-    """The quickest of some repetitions of a decision, each with the estimate of before the last record."""
+    """The quickest of some repetitions of a decision, each with the estimate before the last record."""
     plan, state, decided = moment
     estimator = OnlineEstimator(plan.robot)
     estimator.estimate(MeasurementSet(state.steering.records[:-1]))

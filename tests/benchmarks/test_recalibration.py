@@ -30,8 +30,8 @@ PASSES = 0.99
 class Calibration:
     """What was stated once, and what was true.
 
-    ``moved_mm`` is how far the farthest task pose moved, at the joint variables that it had with the config
-    of before, and ``moved_by_convention_mm`` how far in the convention's frames.
+    ``moved_mm`` is how far the farthest task pose moved, at the joint variables of the
+    previous config, and ``moved_by_convention_mm`` how far in the convention's frames.
     """
 
     machine: int

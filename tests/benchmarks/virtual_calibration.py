@@ -288,7 +288,7 @@ def verification_of(
     """What a run states of a result: held-out poses before and after, and new ones after a narrow failure.
 
     Args:
-        robots: with the controller's geometry of before, and with the result in it.
+        robots: with the controller's previous geometry, and with the result in it.
         actual: the robot's geometry, and the source of all noise.
 
     Raises:

@@ -1,4 +1,4 @@
-"""The cell of a recorded run: its robot when the run began, its noise, its devices against those of now.
+"""The cell of a recorded run: its robot when the run began, its noise, its devices beside the current ones.
 
 A device that is not what it was when the cell was last run was exchanged, set anew, or plugged elsewhere.
 That may be on purpose, and a new run takes them as they are. But a preset, a reversed direction or an

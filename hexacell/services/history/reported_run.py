@@ -11,13 +11,14 @@ from hexacell.cell.loader import load_cell
 from hexacell.cell.model import CellSettings
 from hexacell.config.change import AFTER, BEFORE
 from hexacell.errors import FileError, UsageError
-from hexacell.runs.run_folder import CELL_FILE, JOURNAL, MEASUREMENTS, RESULT, RunFolder
+from hexacell.runs.run_folder import CELL_FILE, MEASUREMENTS, RESULT, RunFolder
 from hexacell.services.history.journal_soundness import read_sound
 from hexacell.storage import atomic_files
+from hexacell.storage.output_files import RUN_JOURNAL
 from procedures.run.state import RunState
 from procedures.steps import events
 
-FINGERPRINTED = (JOURNAL, CELL_FILE, MEASUREMENTS, RESULT, BEFORE, AFTER)
+FINGERPRINTED = (RUN_JOURNAL, CELL_FILE, MEASUREMENTS, RESULT, BEFORE, AFTER)
 """Files of a run folder that the report vouches for, where they are there; of a config every file."""
 
 IDENTIFIER_DIGITS = 12
@@ -56,7 +57,7 @@ class ReportedRun:
     @property
     def identifier(self) -> str:
         """Unique name of this report: cell, run, and a part of the journal's fingerprint."""
-        digits = self.fingerprints[JOURNAL][:IDENTIFIER_DIGITS]
+        digits = self.fingerprints[RUN_JOURNAL][:IDENTIFIER_DIGITS]
         return f"{self.settings.name} / {self.name} / {digits}"
 
 

@@ -25,7 +25,7 @@ class ConfigRollback:
     Attributes:
         paths: the files of the config.
         undone: the run whose geometry the config had; None where it had that from before all runs.
-        restored: the files in a run folder that the config is a copy of now.
+        restored: the files in a run folder that the config is now a copy of.
         change: the change of the text, as a unified diff; empty where nothing had to be written.
         unrecorded: why the history has no record of it, in a sentence; empty if it has.
     """

@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from hexacell.cell.loader import Cell, load_cell
+from hexacell.cell.loader import Cell, is_cell_file, load_cell
 from hexacell.config.change import ConfigChange
 from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import ConfigLayout, are_same_files, fingerprint
@@ -115,7 +115,7 @@ def read_proposal(folder: RunFolder) -> Proposal:
 
 def _own_cell(folder: RunFolder, started: events.RunStarted) -> Cell:
     """The cell that made a run folder: its file is beside ``runs``, as it was when the run began."""
-    for path in sorted(folder.siblings.parent.parent.glob("*.toml")):
+    for path in filter(is_cell_file, sorted(folder.siblings.parent.parent.glob("*.toml"))):
         with suppress(HexacellError):
             cell = load_cell(path)
             its = runs_folder(cell).resolve(), cell.text_without_secrets

@@ -7,9 +7,9 @@
 
 PYTHON = python3
 ARGS =
-# Tests of devices mostly wait, so that five processes keep two cores busy. In the order of the folders
+# Tests of devices mostly wait, so that four processes keep two cores busy. In the order of the folders
 # the long files come early; by default files with few tests, which are the long ones, would come last.
-SEVERAL_AT_A_TIME = -n 5 --dist loadfile --no-loadscope-reorder
+SEVERAL_AT_A_TIME = -n 4 --dist loadfile --no-loadscope-reorder
 # Not even imported, by each of them.
 ELSEWHERE = --ignore=tests/benchmarks --ignore=tests/linuxcnc
 RUN = .venv/bin/python -m

@@ -3,6 +3,8 @@
 import os
 import threading
 
+import pytest
+
 from procedures.journal.journal import read_entries
 
 CHECK = ("--mode", "check", "--unattended")
@@ -28,6 +30,7 @@ def test_where_no_events_can_be_written_nothing_moves(typed_here, quick_cell, tm
     assert quick_cell.runs() == []
 
 
+@pytest.mark.slow
 def test_a_reader_that_leaves_does_not_end_the_run(typed_here, quick_cell, few_candidates, tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)

@@ -26,6 +26,7 @@ def tell(folder, name: str, url: str, *lines: str) -> None:
         cell.write(f'\n[[notifications]]\nname = "{name}"\nurl = "{url}"\n{further}')
 
 
+@pytest.mark.slow
 def test_a_check_tells_its_verdict(typed_here, quick_cell, few_candidates, tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("HEXACELL_NOTIFY_HALL_TOKEN", TOKEN)
     every = 'on = ["pass", "no-pass", "alarm", "answer-needed", "failure"]'

@@ -23,6 +23,7 @@ def manipulated(demo, tmp_path):
     return path, line
 
 
+@pytest.mark.slow
 def test_a_manipulated_journal_is_different_and_the_record_is_named(typed_here, manipulated):
     path, line = manipulated
     outcome = typed_here("replay", path, "--only", "results", "--json")

@@ -79,6 +79,7 @@ class TestAPersonAtTheTerminal:
         question = terminal.read_until("Type yes or no: ")
         return process, question, fast_cell
 
+    @pytest.mark.slow
     def test_sees_the_change_and_approves_it(self, waiting, terminal, demo):
         process, question, cell = waiting
         lines = question.replace("\r\n", "\n").splitlines()

@@ -58,6 +58,7 @@ def to_go_on(words: str) -> list[str]:
     return arguments
 
 
+@pytest.mark.slow
 def test_a_check_is_stopped_at_once_and_resumed_by_the_printed_command(start, typed_here, good_cell):
     config = good_cell.controller.read_bytes()
     process = start("run", good_cell.cell, "--unattended")

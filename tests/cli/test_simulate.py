@@ -5,6 +5,8 @@ import signal
 import tomllib
 from pathlib import Path
 
+import pytest
+
 CELL = "simulated-hexaglide.toml"
 CONTROLLER = "simulated-hexaglide.controller.toml"
 
@@ -52,6 +54,7 @@ def test_a_signal_ends_simulate_without_leftovers(start, cell_folder, typed_here
         assert port.startswith("/dev/pts/") or not Path(port).exists()
 
 
+@pytest.mark.slow
 def test_simulate_ends_while_a_run_is_connected(quick_cell, start):
     """The run then reports which device is lost, and that it can be resumed."""
     simulation, text = serving(start, quick_cell)

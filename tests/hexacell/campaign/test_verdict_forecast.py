@@ -99,6 +99,7 @@ def forecast(cell):
     return predicted_verdicts(cell.plan, cell.found, cell.first)
 
 
+@pytest.mark.slow
 def test_the_held_out_records_confirm_the_identification_and_lessen_its_covariance(cell) -> None:
     change = np.abs(cell.updated.free - cell.found.free)
     assert (change < 2e-3 * np.sqrt(np.diag(cell.found.free_covariance))).all()

@@ -55,6 +55,7 @@ async def test_a_folder_with_a_run_takes_no_new_one_and_what_is_over_is_not_resu
     assert finished.folder.journal.read_bytes() == before
 
 
+@pytest.mark.slow
 async def test_the_cell_is_held_while_it_runs_and_free_afterwards(make_site, finished) -> None:
     site = make_site()
     site.write(finished.until(events.Proposed), finished)
@@ -133,6 +134,7 @@ async def test_a_run_is_resumed_as_what_it_was_begun(make_site, finished) -> Non
         await site.calibrate(resume=True, length_check=True)
 
 
+@pytest.mark.slow
 async def test_a_cancelled_run_stops_in_place_and_can_be_resumed(make_site, finished) -> None:
     site = make_site()
     site.write(finished.until(events.SetClosed), finished)

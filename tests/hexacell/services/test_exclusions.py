@@ -26,6 +26,7 @@ THREE_POINTS = ((100.0, -100.0, 500.0), (0.0, 150.0, 520.0), (-100.0, 100.0, 500
 """The first and the last are the points of the cell that was calibrated."""
 
 
+@pytest.mark.slow
 async def test_others_are_measured_in_their_place_and_points_are_left(make_site, finished):
     samples = fold(finished.history).samples(Phase.IDENTIFY)
     poses = [one.pose for one in samples if one.orientation in {3, 6}]

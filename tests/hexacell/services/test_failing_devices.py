@@ -86,6 +86,7 @@ def in_the_room(tmp_path: Path) -> ThermometerSettings:
     return ThermometerSettings(name="room", path=str(path))
 
 
+@pytest.mark.slow
 async def test_temperatures_are_in_the_journal_and_do_not_change_its_replay(make_site, tmp_path, caplog):
     nowhere = ThermometerSettings(name="rails", path=str(tmp_path / "nowhere"))
     site = make_site(thermometers=(in_the_room(tmp_path), nowhere))

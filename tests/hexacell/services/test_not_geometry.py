@@ -23,6 +23,7 @@ WORN: dict[str, Any] = {
 """Play and compliance are parts of the worn demo."""
 
 
+@pytest.mark.slow
 async def test_the_controller_corrects_what_was_found_and_the_machine_passes(make_site) -> None:
     site = make_site(**WORN)
     ended = await site.calibrate()

@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pytest
 
 from hexacell.cell.devices import ThermometerSettings
 from hexacell.services.run.replay_run import replay
@@ -14,6 +15,7 @@ LEGS = [ThermometerSettings(name=f"leg {leg}", path="simulated", legs=(leg,)) fo
 BASE = ThermometerSettings(name="base", path="simulated", part="base")
 
 
+@pytest.mark.slow
 async def test_a_run_takes_the_expansion_of_its_legs_out_and_says_for_which_temperature(make_site) -> None:
     steel = {f"uncertainty__expansion_{part}_um_m_k": 11.5 for part in ("legs", "base", "platform")}
     # From the first second on, however long the run takes.

@@ -78,6 +78,7 @@ async def require_finished(rig: Any) -> None:
     assert [len(measured.samples) for measured in state.sets.values()] == [9, 9, 3, 3, 5, 5]
 
 
+@pytest.mark.slow
 async def test_an_abort_at_a_reference_pose_reverts_the_provisional_geometry(rig) -> None:
     before = rig.config
     with pytest.raises(Interruption):
@@ -86,7 +87,7 @@ async def test_an_abort_at_a_reference_pose_reverts_the_provisional_geometry(rig
     await require_finished(rig)
 
 
-@pytest.mark.sample("2")
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [2, 5])
 async def test_an_abort_within_a_set_leaves_the_provisional_geometry_until_the_run_resumes(rig, count):
     before = rig.config

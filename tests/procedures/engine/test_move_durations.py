@@ -76,6 +76,7 @@ async def test_a_move_with_gauges_at_the_ball_is_as_much_slower_as_stated(make_r
     assert at_gauges_s == pytest.approx(free_s * 40.0 / 25.0)
 
 
+@pytest.mark.slow
 async def test_in_a_whole_run_no_slider_and_no_point_of_the_platform_is_faster_than_allowed(
     recording, replayed
 ):

@@ -74,6 +74,7 @@ async def test_an_unattended_run_retries_a_silent_gauge_and_then_redoes_its_set(
     assert rig.gauges[0].closed == 0, "the others are left alone"
 
 
+@pytest.mark.slow
 async def test_an_unattended_run_ends_after_a_bounded_number_of_attempts(rig) -> None:
     silent = failing(KEY, lambda: rig.gauges[1].failures.append(SILENT), 100)
     with pytest.raises(GaugeSilent):

@@ -71,6 +71,7 @@ def test_a_run_is_reproduced(recording, replay) -> None:
     assert report.taken == 1, "only the beginning is taken as it stands"
 
 
+@pytest.mark.slow
 def test_a_run_of_before_directions_were_kept_is_reproduced(recording, replay) -> None:
     """Its records have none, nothing by them was looked for, and what a replay computes is not compared."""
     history = [type(event).model_validate(without_directions(event)) for event in recording.history]

@@ -21,6 +21,7 @@ from tests.procedures.rig import MakeRig
 from tests.procedures.runs.listening import happened, on, stop_here
 
 
+@pytest.mark.slow
 async def test_they_are_noticed_and_references_read_again_become_records(make_rig: MakeRig, tmp_path: Path):
     noise: dict[str, Any] = {"noise__standstill_readings": 16, "noise__revisits": 6}
     rig = make_rig(simulation__seed=2, simulation__gauges__drift_um=10.0, **noise)

@@ -19,6 +19,7 @@ def directions(rig: Any) -> set[tuple[int, ...]]:
     return {event.reading.directions for kind in kinds for event in happened(rig, kind)}
 
 
+@pytest.mark.slow
 async def test_with_backlash_a_run_repeats_as_without_and_passes(make_rig) -> None:
     rig = make_rig(motion__approach="one-sided", **BACKLASH)
     ended = await rig.run()

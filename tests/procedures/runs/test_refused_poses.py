@@ -51,6 +51,7 @@ async def test_a_resumed_run_does_not_send_it_again(make_rig) -> None:
 POINTS = ((100.0, -100.0, 500.0), (0.0, 150.0, 520.0), (-100.0, 100.0, 500.0))
 
 
+@pytest.mark.slow
 async def test_a_point_whose_reference_is_refused_is_left(make_rig) -> None:
     rig = make_rig(
         **limits(y=(-120.0, 120.0)), identification__points=POINTS, identification__orientations=7

@@ -97,6 +97,7 @@ def test_after_is_the_scatter_of_machines_that_the_covariance_allows(
     assert (standard_error < 0.2 * told).all()
 
 
+@pytest.mark.slow
 def test_repeated_measurements_have_the_predicted_errors(repeated, paper, workspace):
     """The truth stands in for the machine: its distance from each estimate is that estimate's error."""
     poses = PoseBatch.of(workspace)

@@ -64,6 +64,7 @@ def test_the_reference_once_more_gains_less_than_another_record(visit, make_prob
     assert error(list) < error(lambda r: [*r[:6], replace(r[0], orientation=AGAIN + 1), *r[6:-1]])
 
 
+@pytest.mark.slow
 def test_machines_whose_gauges_drift_are_identified_twice_as_well_and_within_u(visit, make_problem, paper):
     """Of 40 machines, whose sets move by 20 um: the error at poses of a task, and what is said of it."""
     exact = closed(visit(seed=2).measured())

@@ -19,6 +19,7 @@ def test_chi_square_is_the_identification_s_and_expects_its_degrees_of_freedom(i
     assert tested.expected == pytest.approx(identified.dof, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_probabilities_of_repeated_measurements_are_spread_evenly(repeated):
     """Kolmogorov's distance from the uniform distribution, at the level 0.001."""
     found = np.sort([one.goodness.probability for one in repeated])

@@ -20,6 +20,7 @@ def within(total, degrees, alarm=1e-4):
     return low < total < high
 
 
+@pytest.mark.slow
 def test_the_covariance_predicts_the_errors(repeated, truth):
     total = 0.0
     for found in repeated:

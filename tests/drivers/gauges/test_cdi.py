@@ -1,12 +1,8 @@
 """CDI and Starrett indicators: the unit in every answer, and parameters."""
 
-import re
-
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from drivers.errors import GaugeAtEnd, GaugeSilent, WrongSetting, ZeroVoid
+from drivers.errors import GaugeSilent, WrongSetting, ZeroVoid
 from drivers.gauges.cdi import CdiGauge, Parameter, parse_parameter
 from drivers.gauges.protocol import FrameRejected
 from drivers.interfaces import DeviceIdentity, GaugeReading
@@ -37,49 +33,6 @@ async def opened(dialogue, gauge):
 # Frames
 
 parse_value = CdiGauge(GaugeSettings(name="y", axis="y", protocol="cdi"), SharedSerialPorts())._parse_value
-
-
-@pytest.mark.parametrize(
-    ("frame", "value", "unit"),
-    [
-        (b"+  2.1380, MM\r", 2.138, "mm"),
-        (b"- 12.3450, MM\r", -12.345, "mm"),
-        (b"+00002.13, MM\r", 2.13, "mm"),
-        (b"+2.13    , MM\r", 2.13, "mm"),
-        (b"+ 0.08417, IN\r", 0.08417, "inch"),
-    ],
-)
-def test_a_value_is_read_with_its_unit(frame, value, unit):
-    shown = parse_value(frame)
-    assert (shown.value, shown.unit) == (value, unit)
-
-
-@pytest.mark.parametrize(
-    "frame",
-    [
-        *(b"   2.1380, MM\r", b"+ 2.1380, MM\r", b"+   2.1380, MM\r", b"+ 2 .1380, MM\r"),
-        *(b"+  2.13 0, MM\r", b"+  2.1380; MM\r", b"+  2.1380, mm\r", b"+  2.1380,MM\r"),
-        *(b"+  21380 , MM\r", b"+  2.1380, MM", b"+  2.\xb1380, MM\r", b"NOT FOUND\r", b""),
-    ],
-)
-def test_malformed_values_are_rejected(frame):
-    with pytest.raises(FrameRejected):
-        parse_value(frame)
-
-
-@given(
-    st.binary(max_size=16)
-    | st.from_regex(rb"[+\- ][0-9. ]{7,9}, ?(IN|MM|NM|MN)\r", fullmatch=True)
-    | st.from_regex(rb"[+-] *[0-9]{1,3}\.[0-9 ]{1,4}, MM\r", fullmatch=True)
-)
-def test_noise_is_a_value_only_if_it_is_one_to_the_last_byte(noise):
-    try:
-        shown = parse_value(noise)
-    except (FrameRejected, GaugeAtEnd):
-        return
-    assert re.fullmatch(rb"[+-] *[0-9]+\.[0-9]+ *, (IN|MM)\r", noise)
-    assert len(noise) == 14
-    assert abs(shown.value) == float(noise[1:9])
 
 
 @pytest.mark.parametrize("frame", [b"1\r", b"p021=1\r", b"P021 = 1\r", b"p021=001\r"])

@@ -1,18 +1,12 @@
 """MUX-10 frames: several gauges behind one line."""
 
-import re
-
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from drivers.errors import EmptyChannel, GaugeAtEnd, GaugeSilent, WrongAnswer, WrongSetting, ZeroVoid
+from drivers.errors import WrongAnswer, WrongSetting, ZeroVoid
 from drivers.gauges import mux10
-from drivers.gauges.mux10 import MultiplexerBusy, Mux10Gauge, parse_identification
-from drivers.gauges.protocol import DisplayedValue, FrameRejected
+from drivers.gauges.mux10 import Mux10Gauge, parse_identification
+from drivers.gauges.protocol import FrameRejected
 from drivers.interfaces import DeviceIdentity, GaugeReading
-from drivers.serial.shared_port import SharedSerialPorts
-from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError
 
 VALUE = b"02A+0000.123\r"
@@ -37,62 +31,6 @@ def no_pause(monkeypatch):
 
 
 # Frames
-
-
-def parse_value(frame, channel=2):
-    settings = GaugeSettings(name="y", axis="y", protocol="mux10", channel=channel)
-    return Mux10Gauge(settings, SharedSerialPorts())._parse_value(frame)
-
-
-@pytest.mark.parametrize(
-    ("frame", "value", "decimals"),
-    [
-        (b"02A+0000.123\r", 0.123, 3),
-        (b"02A-0012.340\r", -12.34, 3),
-        (b"02A-001.2340\r", -1.234, 4),
-        (b"02A+00.00484\r", 0.00484, 5),
-    ],
-)
-def test_a_value_is_read(frame, value, decimals):
-    assert parse_value(frame) == DisplayedValue(value, decimals, None, frame.decode().strip())
-
-
-@pytest.mark.parametrize(
-    ("frame", "error"),
-    [
-        (b"911\r", EmptyChannel),
-        (b"918\r", MultiplexerBusy),
-        (b"912\r", GaugeAtEnd),
-        (b"921\r", EmptyChannel),
-    ],
-)
-def test_an_error_is_read(frame, error):
-    with pytest.raises(error):
-        parse_value(frame)
-
-
-@pytest.mark.parametrize(
-    "frame",
-    [
-        b"01A+0000.123\r",  # another channel
-        *(b"931\r", b"02A 0000.123\r", b"02A+000.123\r", b"02A+00000.123\r", b"02A+00000123\r"),
-        *(b"02A+00.0.123\r", b"02B+0000.123\r", b"02A+0000.123", b"02A+0000.1\xb23\r", b"91\r", b""),
-    ],
-)
-def test_malformed_values_are_rejected(frame):
-    with pytest.raises(FrameRejected):
-        parse_value(frame)
-
-
-@given(st.binary(max_size=15) | st.from_regex(rb"0[0-9]A[+\- ][0-9. ]{6,9}\r", fullmatch=True))
-def test_noise_is_a_value_only_if_it_is_one_to_the_last_byte(noise):
-    try:
-        shown = parse_value(noise)
-    except (FrameRejected, DeviceError, MultiplexerBusy):
-        return
-    assert re.fullmatch(rb"02A[+-][0-9]+\.[0-9]+\r", noise)
-    assert len(noise) == 13
-    assert shown.value == float(noise[3:])
 
 
 @pytest.mark.parametrize("frame", [b"911\r", b"01A+0000.123\r", b"\x80MUX\r", b"\r"])
@@ -131,12 +69,6 @@ async def test_a_multiplexer_that_stays_busy_is_an_error(dialogue, opened, no_pa
         await opened.read()
 
 
-async def test_a_channel_without_a_gauge_is_silent(dialogue, gauge):
-    dialogue.expect((b"2\r", b"911\r"))
-    with pytest.raises(GaugeSilent, match=r"does not answer its multiplexer \(911\).*channel"):
-        await gauge.open()
-
-
 async def test_a_plunger_at_its_end_does_not_prevent_opening(dialogue, gauge):
     dialogue.expect((b"2\r", b"912\r"), OPENING[1], (b"2\r", VALUE), (b"2\r", VALUE), (b"2\r", VALUE))
     await gauge.open()
@@ -148,12 +80,6 @@ async def test_a_value_sent_by_the_data_button_of_another_channel_is_discarded(d
     dialogue.expect((b"2\r", b"01A+0009.999\r" + VALUE), (b"2\r", VALUE), (b"2\r", VALUE))
     dialogue.unasked(b"01A+0008.888\r")
     assert (await opened.read()).value_mm == 0.123
-
-
-async def test_five_decimals_are_inches(dialogue, gauge):
-    dialogue.expect((b"2\r", b"02A+00.00484\r"))
-    with pytest.raises(WrongSetting, match="gauge y: answers in inch"):
-        await gauge.open()
 
 
 @pytest.mark.parametrize("call", ["read", "check", "read_once"])

@@ -11,7 +11,7 @@ from drivers.encoders.modbus import ModbusBank
 from drivers.errors import GaugeSilent
 from drivers.gauges.digimatic_usb import DigimaticUsbGauge
 from drivers.serial.modbus_port import ModbusPort
-from hexacell.cell.devices import GaugeSettings, LinearEncoderSettings
+from hexacell.cell.devices import LinearEncoderSettings
 from hexacell.plugins import Group, load
 from tests.drivers.simulated.gauges.served.cell import DESCRIBED, DISPLAYS, PROTOCOLS, cell
 from tests.waiting import until
@@ -42,14 +42,6 @@ async def test_a_banner_is_no_answer(dialogue, links, settings):
     gauge = DigimaticUsbGauge(settings("digimatic-usb", settle_s=1.0), links)
     dialogue.expect(*[(b"\n", b"Digimatic reader 1.2\n")] * 5, (b"\n", VALUE))
     await gauge.open()
-
-
-async def test_one_that_stays_silent_is_told_with_what_to_set(dialogue, links, settings):
-    gauge = DigimaticUsbGauge(settings("digimatic-usb", settle_s=0.2), links)
-    dialogue.expect(*[(b"\n", b"")] * 9)
-    with pytest.raises(GaugeSilent, match="settle_s"):
-        await gauge.open()
-    dialogue.expected.clear()
 
 
 async def test_its_control_lines_are_those_of_the_cell_file(dialogue, links, settings):
@@ -91,7 +83,3 @@ async def test_modbus_encoders_are_asked_again_too(monkeypatch):
         twin.inject("silent", on=False)
         assert len(await opening) == 6
         await bank.close()
-
-
-def test_a_gauge_has_some_time_unless_stated():
-    assert GaugeSettings(name="x", axis="x", protocol="request").settle_s > 1.7

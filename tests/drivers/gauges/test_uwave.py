@@ -3,11 +3,9 @@
 import pytest
 
 from drivers.errors import EmptyChannel, GaugeSilent
-from drivers.gauges.uwave import UwaveGauge, channel_of
+from drivers.gauges.uwave import UwaveGauge
 from drivers.interfaces import GaugeReading
 from drivers.serial.opening import SLICE_S
-from drivers.serial.shared_port import SharedSerialPorts
-from hexacell.cell.devices import GaugeSettings
 
 DELAY_S = 0.02
 
@@ -15,39 +13,6 @@ DELAY_S = 0.02
 @pytest.fixture
 async def gauge(links, settings):
     return UwaveGauge(settings("uwave", channel=2, delay_s=DELAY_S, timeout_s=0.2), links)
-
-
-@pytest.mark.parametrize(
-    ("frame", "value", "decimals"),
-    [
-        (b"DT10000+00000011.88M", 11.88, 2),
-        (b"DT10002-0000000.001M", -0.001, 3),
-        (b"DT10203+000.1234567I", 0.1234567, 7),
-    ],
-)
-def test_frames_that_were_captured_are_read(frame, value, decimals):
-    gauge = UwaveGauge(GaugeSettings(name="x", axis="x", protocol="uwave"), SharedSerialPorts())
-    shown = gauge._parse_value(frame)
-    assert (shown.value, shown.decimals) == (value, decimals)
-    assert shown.unit == ("inch" if frame.endswith(b"I") else "mm")
-
-
-@pytest.mark.parametrize(
-    "frame",
-    [
-        b"DT10002-0000000.001",
-        b"DT10002-0000000.001MM",
-        b"DT10002-000000.001M",
-        b"DT1002-00000000.001M",
-        b"DT10002 0000000.001M",
-        b"DT10002-00000000001M",
-        b"ST1000100009233899",
-        b"TI1120000009241511",
-        b"",
-    ],
-)
-def test_what_is_no_whole_value_is_none(frame):
-    assert channel_of(frame) is None
 
 
 async def test_opening_and_reading_take_what_comes(line, dialogue, gauge):

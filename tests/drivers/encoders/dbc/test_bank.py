@@ -49,10 +49,18 @@ async def test_the_request_is_on_the_wire(settings, wire):
     await bank.close()
 
 
-async def test_one_that_is_silent_from_the_start_is_named(settings, wire):
-    bank = DbcBank(settings(wire.settings))
-    with pytest.raises(SilentNodeError, match="leg 5"):
-        await while_sending(wire, bank.open, without=5)
+@pytest.mark.parametrize(
+    ("window_s", "sent", "error", "told"),
+    [
+        (1.0, {"without": 5}, SilentNodeError, "leg 5"),
+        (1.0, {"length": 5}, InvalidSampleError, "sends 5 bytes, where the DBC file has 6"),
+        (1e-9, {}, DeviceError, r"encoders: send \d+ ms apart"),
+    ],
+)
+async def test_what_is_no_sample_of_six_is_told(settings, wire, window_s, sent, error, told):
+    bank = DbcBank(settings(wire.settings, window_s=window_s))
+    with pytest.raises(error, match=told):
+        await while_sending(wire, bank.open, **sent)
 
 
 @pytest.mark.parametrize(("frame", "told"), [(None, "CAN adapter"), (0x700, "but others do.*DBC")])
@@ -64,12 +72,6 @@ async def test_a_bus_without_any_encoder_is_told_and_not_the_first_leg(settings,
         await asyncio.sleep(0)
     with pytest.raises(SilentNodeError, match=f"^each encoder: sends nothing .*{told}"):
         await opening
-
-
-async def test_frames_of_another_length_are_no_positions(settings, wire):
-    bank = DbcBank(settings(wire.settings))
-    with pytest.raises(InvalidSampleError, match="sends 5 bytes, where the DBC file has 6"):
-        await while_sending(wire, bank.open, length=5)
 
 
 async def test_a_position_outside_the_range_of_the_file_is_refused(settings, wire):
@@ -85,12 +87,6 @@ async def test_a_position_outside_the_range_of_the_file_is_refused(settings, wir
     with pytest.raises(InvalidSampleError, match=r"leg 3.*sends 2050, outside the range in the DBC file"):
         await reading
     await bank.close()
-
-
-async def test_positions_that_come_far_apart_are_no_sample(settings, wire):
-    bank = DbcBank(settings(wire.settings, window_s=1e-9))
-    with pytest.raises(DeviceError, match=r"encoders: send \d+ ms apart"):
-        await while_sending(wire, bank.open)
 
 
 @pytest.mark.parametrize(

@@ -17,19 +17,6 @@ async def test_a_silent_gauge_is_named_with_what_to_do(dialogue, gauge):
     assert not dialogue.is_open
 
 
-async def test_an_echo_without_an_answer_is_reported_as_silence(dialogue, gauge):
-    dialogue.expect((b"UNI?\r", b"UNI?\r"))
-    with pytest.raises(GaugeSilent, match="only the echo of the request comes back"):
-        await gauge.open()
-
-
-async def test_even_parity_read_as_eight_bits_is_recognised(dialogue, gauge):
-    with_parity = bytes(byte | (byte.bit_count() % 2) << 7 for byte in b"MM\r")
-    dialogue.expect(*[(b"UNI?\r", with_parity)] * 3)
-    with pytest.raises(WrongAnswer, match=r"check parity settings.*4800 baud 7E2"):
-        await gauge.open()
-
-
 async def test_requests_with_wrong_parity_are_recognised(dialogue, opened):
     dialogue.expect(*[(b"?\r", b"ERR2\r")] * 3)
     with pytest.raises(WrongAnswer, match=r"ERR2.*Check parity settings"):

@@ -22,19 +22,8 @@ from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.stated import stated_effects
 from hexacell.robot.virtual_robot import VirtualRobot
+from hexacell.uncertainty import effect_kinds
 from hexacell.uncertainty.budget import UncertaintyBudget
-from hexacell.uncertainty.effect_kinds import (
-    ball_roundness,
-    common_encoder_scale,
-    common_sag,
-    encoder_scales,
-    gauge_scales,
-    load_at_work,
-    rail_directions,
-    rail_waves,
-    stop_repeatability,
-    temperature_at_work,
-)
 from hexacell.uncertainty.effects import Effect
 from hexacell.uncertainty.propagation import Propagation
 from tests.benchmarks.figures import between
@@ -42,16 +31,16 @@ from tests.benchmarks.machines import bundled
 
 ALUMINIUM = dict.fromkeys(MachinePart, 23.0)
 TABLE: tuple[tuple[str, Effect, float], ...] = (
-    ("common encoder scale 1e-4", common_encoder_scale(100.0), 0.019),
-    ("each encoder's scale 1e-4", encoder_scales(100.0), 0.099),
-    ("rails wavy 20 um, 600 mm long", rail_waves(20.0, 600.0), 0.130),
-    ("rails wavy 20 um, 1,500 mm long", rail_waves(20.0, 1500.0), 0.058),
-    ("rails sag 50 um", common_sag(50.0, 800.0), 0.023),
-    ("rails 0.1 mrad off parallel", rail_directions(0.1), 0.099),
-    ("gauge scale 1e-3", gauge_scales(1.0, is_estimated=False), 0.001),
-    ("ball 5 um out of round", ball_roundness(5.0), 0.006),
-    ("all 1 K warmer at work, aluminium", temperature_at_work(1.0, ALUMINIUM), 0.006),
-    ("20 N at 0.05 um/N a leg", load_at_work(20.0, 0.05), 0.040),
+    ("common encoder scale 1e-4", effect_kinds.common_encoder_scale(100.0), 0.019),
+    ("each encoder's scale 1e-4", effect_kinds.encoder_scales(100.0), 0.099),
+    ("rails wavy 20 um, 600 mm long", effect_kinds.rail_waves(20.0, 600.0), 0.130),
+    ("rails wavy 20 um, 1,500 mm long", effect_kinds.rail_waves(20.0, 1500.0), 0.058),
+    ("rails sag 50 um", effect_kinds.common_sag(50.0, 800.0), 0.023),
+    ("rails 0.1 mrad off parallel", effect_kinds.rail_directions(0.1), 0.099),
+    ("gauge scale 1e-3", effect_kinds.gauge_scales(1.0, is_estimated=False), 0.001),
+    ("ball 5 um out of round", effect_kinds.ball_roundness(5.0), 0.006),
+    ("all 1 K warmer at work, aluminium", effect_kinds.temperature_at_work(1.0, ALUMINIUM), 0.006),
+    ("20 N at 0.05 um/N a leg", effect_kinds.load_at_work(20.0, 0.05), 0.040),
 )
 SUMS: dict[Grade, float] = {"ideal": 0.063, "precision": 0.115, "ordinary": 0.161}
 """U by grade."""
@@ -103,7 +92,7 @@ def test_effects_and_their_sums_are_as_large_as_an_independent_simulation_says(t
         figure(f"{name}, at the worst task pose, mm: through the result", line.through_mm)
         figure(f"{name}: directly", line.direct_mm)
         figure(f"{name}: both, an independent simulation {beside}", line.combined_mm, "", near)
-    stops = UncertaintyBudget.of(propagation, (stop_repeatability(5.0),)).lines[0]
+    stops = UncertaintyBudget.of(propagation, (effect_kinds.stop_repeatability(5.0),)).lines[0]
     words = "repeatability 5 um a slider, mm:"
     drawn_mm = through_drawn_stops(propagation, table_one.truth, 0.005)
     near = between(0.85 * drawn_mm, 1.15 * drawn_mm)

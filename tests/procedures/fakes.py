@@ -27,14 +27,7 @@ from hexacell.kinematics.pose import Pose
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.verification import Verification
 from procedures.devices.device_set import Devices, MountedGauge
-from procedures.run.questions import (
-    GaugePlacement,
-    PendingChange,
-    Question,
-    StepFailure,
-    UnreadyController,
-    WrittenResult,
-)
+from procedures.run import questions
 
 HALF_TRAVEL_MM = 6.25
 
@@ -217,21 +210,21 @@ class Approver:
         self.startup: list[str] = []
         self.verifications: list[Verification] = []
 
-    async def ask(self, question: Question) -> str | None:
+    async def ask(self, question: questions.Question) -> str | None:
         match question.subject:
-            case GaugePlacement(point=point):
+            case questions.GaugePlacement(point=point):
                 self.placed.append(point)
                 return question.default
-            case PendingChange(gates=gates, diff=diff):
+            case questions.PendingChange(gates=gates, diff=diff):
                 self.asked.append((gates, diff))
                 return self.name
-            case WrittenResult(verification=verification):
+            case questions.WrittenResult(verification=verification):
                 self.verifications.append(verification)
                 return self.name
-            case StepFailure(problem=problem):
+            case questions.StepFailure(problem=problem):
                 self.problems.append(problem)
                 return self.decisions.pop(0) if self.decisions else Action.ABORT
-            case UnreadyController(problem=problem, request=request):
+            case questions.UnreadyController(problem=problem, request=request):
                 self.problems.append(f"{problem}. {request}")
                 return self.startup.pop(0)
 
@@ -239,7 +232,7 @@ class Approver:
 class SilentOperator:
     """An operator who never answers, so that a command has to."""
 
-    async def ask(self, question: Question) -> str | None:
+    async def ask(self, question: questions.Question) -> str | None:
         await asyncio.Event().wait()
         return question.default
 

@@ -9,14 +9,8 @@ from drivers.interfaces import StartupAction
 from hexacell.cell.loader import Cell
 from hexacell.cell.recovery import Action
 from hexacell.kinematics.pose import Pose
+from hexacell.run_process import messages
 from hexacell.run_process.client import LOST
-from hexacell.run_process.messages import (
-    ControlChanged,
-    EventRecorded,
-    HostFailed,
-    HostMessage,
-    StatusChanged,
-)
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.child import Preflight
 from hexacell.screen.overlays import FaultOverlay, QuestionOverlay
@@ -107,7 +101,7 @@ async def test_from_mounting_to_approval(cell, run, history, opened) -> None:
 
         run.close_question()
         run.record(history[PROPOSED:])
-        run.tell(StatusChanged(status=Status.ENDED))
+        run.tell(messages.StatusChanged(status=Status.ENDED))
         await until(lambda: not isinstance(pilot.app.screen, QuestionOverlay))
         await press(pilot, "4")
         await until_shown(pilot, "PASS: The error and the guard band together are within the limit.")
@@ -120,11 +114,11 @@ async def test_one_key_each_for_who_is_in_control(cell, run, history, opened) ->
         await press(pilot, "P", "u", "m", "p", "a")
         again = MeasureAgain(SetKey(phase=Phase.IDENTIFY, point=5))
         assert run.given == [Pause(at_once=True), Undo(), again, Pause(), Abort()]
-        run.tell(StatusChanged(status=Status.PAUSED))
+        run.tell(messages.StatusChanged(status=Status.PAUSED))
         await until_shown(pilot, "paused: the robot stands still")
         await press(pilot, "p")
         assert run.given.pop() == Resume()
-        run.tell(ControlChanged(is_in_control=False, who="grace"))
+        run.tell(messages.ControlChanged(is_in_control=False, who="grace"))
         await until_shown(pilot, "you only watch: grace is in control; c takes over")
         await press(pilot, "p", "c")
         assert len(run.given) == 5
@@ -187,11 +181,11 @@ async def test_a_fault_that_the_run_has_left_behind_is_not_shown_on_attaching(ce
     [
         (
             (
-                EventRecorded(
+                messages.EventRecorded(
                     sequence=999, at=BEGUN, event=events.Interrupted(reason="aborted", exit_code=130)
                 ),
-                StatusChanged(status=Status.ENDED),
-                HostFailed(problem="aborted", exit_code=130),
+                messages.StatusChanged(status=Status.ENDED),
+                messages.HostFailed(problem="aborted", exit_code=130),
             ),
             ("The run ended early", "aborted", RESUMABLE),
             "ended early: aborted",
@@ -201,7 +195,7 @@ async def test_a_fault_that_the_run_has_left_behind_is_not_shown_on_attaching(ce
     ids=["it was aborted", "its process died"],
 )
 async def test_the_end_of_a_run_is_a_single_fault_and_it_is_not_shown_as_running(
-    ending: tuple[HostMessage, ...],
+    ending: tuple[messages.HostMessage, ...],
     fault: tuple[str, str, str],
     now: str,
     cell: Cell,

@@ -11,14 +11,8 @@ import pytest
 
 from hexacell.cell.loader import Cell
 from hexacell.errors import ExitCode
+from hexacell.run_process import messages
 from hexacell.run_process.host import RemoteOperator, RunHost
-from hexacell.run_process.messages import (
-    EventRecorded,
-    HostMessage,
-    QuestionChanged,
-    RunDescribed,
-    StatusChanged,
-)
 from hexacell.run_process.run_socket import listening_socket
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.run.calibration_run import RunRequest
@@ -83,24 +77,24 @@ def hosted(path: Path, cell: Cell) -> Hosted:
     return run
 
 
-def asks(kind: type) -> Callable[[HostMessage], bool]:
+def asks(kind: type) -> Callable[[messages.HostMessage], bool]:
     return lambda one: (
-        isinstance(one, QuestionChanged)
+        isinstance(one, messages.QuestionChanged)
         and one.question is not None
         and isinstance(one.question.subject, kind)
     )
 
 
-def is_status(status: Status) -> Callable[[HostMessage], bool]:
-    return lambda one: one == StatusChanged(status=status)
+def is_status(status: Status) -> Callable[[messages.HostMessage], bool]:
+    return lambda one: one == messages.StatusChanged(status=status)
 
 
-def told_of(kind: type[Any]) -> Callable[[HostMessage], bool]:
-    return lambda one: isinstance(one, EventRecorded) and isinstance(one.event, kind)
+def told_of(kind: type[Any]) -> Callable[[messages.HostMessage], bool]:
+    return lambda one: isinstance(one, messages.EventRecorded) and isinstance(one.event, kind)
 
 
 def history_told(client: Client) -> list[events.Event]:
-    return [one.event for one in client.told if isinstance(one, EventRecorded)]
+    return [one.event for one in client.told if isinstance(one, messages.EventRecorded)]
 
 
 async def answer_all(client: Client) -> None:
@@ -108,7 +102,7 @@ async def answer_all(client: Client) -> None:
     answers = {GaugePlacement: "placed", StepFailure: "abort"}
     async for message in client._messages:
         client.told.append(message)
-        if isinstance(message, QuestionChanged) and message.question is not None:
+        if isinstance(message, messages.QuestionChanged) and message.question is not None:
             await client.connection.give(Answer(answers.get(type(message.question.subject), "a tester")))
 
 
@@ -124,15 +118,15 @@ async def test_a_whole_run_is_told_and_commanded_over_the_socket(hosted) -> None
         await answer_all(client)
         assert await run.serving is ExitCode.DONE
     described = client.told[0]
-    assert isinstance(described, RunDescribed)
+    assert isinstance(described, messages.RunDescribed)
     assert (described.folder, described.is_recorded) == (run.folder.path, False)
     assert history_told(client) == list(run.history)
-    assert [one.sequence for one in client.told if isinstance(one, EventRecorded)] == [
+    assert [one.sequence for one in client.told if isinstance(one, messages.EventRecorded)] == [
         entry.number for entry in read_entries(run.folder.journal)
     ]
-    questions = [one.question for one in client.told if isinstance(one, QuestionChanged)]
+    questions = [one.question for one in client.told if isinstance(one, messages.QuestionChanged)]
     assert 2 * questions.count(None) == len(questions)
-    assert StatusChanged(status=Status.ENDED) in client.told
+    assert messages.StatusChanged(status=Status.ENDED) in client.told
 
 
 async def test_a_second_client_is_told_the_same_and_the_open_question(hosted) -> None:
@@ -142,7 +136,7 @@ async def test_a_second_client_is_told_the_same_and_the_open_question(hosted) ->
         second = await run.client()
         await second.until(asks(GaugePlacement))
         assert history_told(second) == history_told(first) == list(run.history)
-        assert StatusChanged(status=Status.AWAITING_OPERATOR) in second.told
+        assert messages.StatusChanged(status=Status.AWAITING_OPERATOR) in second.told
         await second.connection.take_control()
         await second.connection.give(Answer("placed"))
         await first.until(told_of(events.GaugesPlaced))
@@ -156,7 +150,7 @@ async def test_where_the_terminal_is_gone_the_record_is_finished_and_the_run_pau
         lost = await run.client()
         await place(lost)
         await lost.until(told_of(events.GaugesPlaced))
-        await lost.until(lambda one: isinstance(one, EventRecorded) and "sample" in str(one.event))
+        await lost.until(lambda one: isinstance(one, messages.EventRecorded) and "sample" in str(one.event))
         lost.hang_up()
         await until(lambda: not run.host._audience.is_controlled)
         back = await run.client()

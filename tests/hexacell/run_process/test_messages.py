@@ -10,23 +10,7 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
 from hexacell.errors import UsageError
-from hexacell.run_process.messages import (
-    ClientMessage,
-    ControlChanged,
-    CursorMoved,
-    EventRecorded,
-    GaugeSnapshot,
-    GiveCommand,
-    HostFailed,
-    HostMessage,
-    LiveSnapshot,
-    QuestionChanged,
-    RunDescribed,
-    StatusChanged,
-    client_message,
-    host_message,
-    message_line,
-)
+from hexacell.run_process import messages
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Command, Undo
 from procedures.run.questions import Question
@@ -54,17 +38,17 @@ def valid(draw: st.DrawFn, kind: type[Any]) -> Any:
         return reject()
 
 
-def told(message: HostMessage) -> str:
+def told(message: messages.HostMessage) -> str:
     """A message as text: a number that is none is not equal to itself. ``fold`` says nothing in UTC."""
     return repr(message).replace(", fold=1", "")
 
 
-def from_host(sent: HostMessage) -> HostMessage:
+def from_host(sent: messages.HostMessage) -> messages.HostMessage:
     """What arrives of a message; it is one line."""
-    line = message_line(sent)
+    line = messages.message_line(sent)
     assert line.endswith(b"\n")
     assert line.count(b"\n") == 1
-    return host_message(line)
+    return messages.host_message(line)
 
 
 @pytest.mark.parametrize("kind", EVENTS, ids=lambda kind: kind.__name__)
@@ -72,7 +56,7 @@ def test_every_event_arrives_as_it_was_sent(kind):
     @SAME_EACH_TIME
     @given(valid(kind))
     def arrives(event: Any) -> None:
-        sent = EventRecorded(sequence=3, at=NOON, event=event)
+        sent = messages.EventRecorded(sequence=3, at=NOON, event=event)
         assert told(from_host(sent)) == told(sent)
 
     arrives()
@@ -83,8 +67,8 @@ def test_every_command_arrives_as_it_was_given(kind):
     @SAME_EACH_TIME
     @given(valid(kind))
     def arrives(command: Any) -> None:
-        received = client_message(message_line(GiveCommand(command=command)))
-        assert isinstance(received, GiveCommand)
+        received = messages.client_message(messages.message_line(messages.GiveCommand(command=command)))
+        assert isinstance(received, messages.GiveCommand)
         assert type(received.command) is kind
         assert received.command == command
 
@@ -97,7 +81,7 @@ def test_every_question_arrives_as_it_was_asked() -> None:
     @settings(SAME_EACH_TIME, max_examples=100)
     @given(valid(Question))
     def arrives(question: Question) -> None:
-        sent = QuestionChanged(question=question)
+        sent = messages.QuestionChanged(question=question)
         subjects.add(type(question.subject))
         assert told(from_host(sent)) == told(sent)
 
@@ -106,7 +90,7 @@ def test_every_question_arrives_as_it_was_asked() -> None:
 
 
 def test_every_kind_has_a_word_of_its_own() -> None:
-    for union in (HostMessage, ClientMessage):
+    for union in (messages.HostMessage, messages.ClientMessage):
         words = [get_args(one.model_fields["kind"].annotation)[0] for one in get_args(get_args(union)[0])]
         assert len(set(words)) == len(words)
 
@@ -114,17 +98,21 @@ def test_every_kind_has_a_word_of_its_own() -> None:
 @pytest.mark.parametrize(
     "sent",
     [
-        HostFailed(problem="one\ntwo\u2028three\r", action="", exit_code=3),
-        RunDescribed(cell="c", cell_file=Path("/a/cell.toml"), folder=Path("/a/run"), mode="check"),
-        ControlChanged(is_in_control=True, who="ada"),
-        StatusChanged(status=Status.PAUSED),
-        LiveSnapshot(gauges=(GaugeSnapshot(name="x", axis="x", shown_mm=-0.1, travel_mm=12.5),)),
-        QuestionChanged(question=None),
-        CursorMoved(sequence=1, last=2, at=NOON, speed=0.5),
+        messages.HostFailed(problem="one\ntwo\u2028three\r", action="", exit_code=3),
+        messages.RunDescribed(
+            cell="c", cell_file=Path("/a/cell.toml"), folder=Path("/a/run"), mode="check"
+        ),
+        messages.ControlChanged(is_in_control=True, who="ada"),
+        messages.StatusChanged(status=Status.PAUSED),
+        messages.LiveSnapshot(
+            gauges=(messages.GaugeSnapshot(name="x", axis="x", shown_mm=-0.1, travel_mm=12.5),)
+        ),
+        messages.QuestionChanged(question=None),
+        messages.CursorMoved(sequence=1, last=2, at=NOON, speed=0.5),
     ],
     ids=lambda sent: sent.kind,
 )
-def test_every_other_message_arrives_as_one_line(sent: HostMessage) -> None:
+def test_every_other_message_arrives_as_one_line(sent: messages.HostMessage) -> None:
     assert from_host(sent) == sent
 
 
@@ -142,6 +130,6 @@ def test_every_other_message_arrives_as_one_line(sent: HostMessage) -> None:
 )
 def test_what_is_no_message_is_refused(line: bytes) -> None:
     with pytest.raises(UsageError, match="is not understood"):
-        client_message(line)
+        messages.client_message(line)
     with pytest.raises(UsageError, match="is not understood"):
-        host_message(message_line(GiveCommand(command=Undo())))
+        messages.host_message(messages.message_line(messages.GiveCommand(command=Undo())))

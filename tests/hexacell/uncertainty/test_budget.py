@@ -7,18 +7,8 @@ import pytest
 
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import Noise
+from hexacell.uncertainty import effect_kinds
 from hexacell.uncertainty.budget import UncertaintyBudget
-from hexacell.uncertainty.effect_kinds import (
-    ball_beside_tool,
-    ball_roundness,
-    common_encoder_scale,
-    common_sag,
-    encoder_scales,
-    gauge_scales,
-    rail_directions,
-    rail_waves,
-    stop_repeatability,
-)
 from hexacell.uncertainty.statement import TaskErrors
 
 GAUGE_SCALE = 2e-3
@@ -32,7 +22,12 @@ def budget_of(laboratory):
     return budget
 
 
-EFFECTS = (encoder_scales(10.0), rail_waves(5.0, 600.0), stop_repeatability(2.0), ball_roundness(2.0))
+EFFECTS = (
+    effect_kinds.encoder_scales(10.0),
+    effect_kinds.rail_waves(5.0, 600.0),
+    effect_kinds.stop_repeatability(2.0),
+    effect_kinds.ball_roundness(2.0),
+)
 
 
 def test_without_effects_it_is_the_noise_alone(exact, propagation, budget_of) -> None:
@@ -66,7 +61,7 @@ def test_an_estimated_effect_is_taken_out_of_the_noise_and_listed(laboratory, bu
     measured = laboratory.visits.measured()
     found = identify(laboratory.make_problem(measured, noise=noise), find_outliers=False)
     plain = budget_of(found)
-    listed = budget_of(found, [gauge_scales(1e3 * GAUGE_SCALE, is_estimated=True)])
+    listed = budget_of(found, [effect_kinds.gauge_scales(1e3 * GAUGE_SCALE, is_estimated=True)])
     assert listed.lines[0].combined_mm > 0.0
     assert listed.noise_mm < plain.noise_mm
     assert listed.standard_mm == pytest.approx(plain.standard_mm)
@@ -87,11 +82,11 @@ def test_what_no_record_shows_is_listed(visit, make_problem, paper, budget_of) -
     near = identify(make_problem(exact, controller=paper.actual), find_outliers=False)
     effects = (
         *EFFECTS,
-        rail_directions(0.02),
-        rail_waves(5.0, 1500.0),
-        common_encoder_scale(0.0),
-        common_sag(0.0, 800.0),
-        ball_beside_tool(0.0),
+        effect_kinds.rail_directions(0.02),
+        effect_kinds.rail_waves(5.0, 1500.0),
+        effect_kinds.common_encoder_scale(0.0),
+        effect_kinds.common_sag(0.0, 800.0),
+        effect_kinds.ball_beside_tool(0.0),
     )
     unseen = budget_of(near, effects).unseen
     assert {line.effect.name for line in unseen} == {
@@ -118,7 +113,7 @@ def test_a_geometry_beside_the_estimate_errs_by_the_difference_with_the_same_unc
 def test_a_budget_with_an_earlier_one_has_its_effects_on_the_prior(laboratory, exact, visit, budget_of):
     """Without them, a short update of a calibrated robot would seem to err by all that cancels."""
     updated = laboratory.updated(exact, visit(points=2, orientations=6, seed=5).measured())
-    effects = (encoder_scales(10.0),)
+    effects = (effect_kinds.encoder_scales(10.0),)
     first = budget_of(exact, effects)
     shared, lost = (budget_of(updated, effects, earlier) for earlier in (first.parameter_columns, None))
     assert shared.systematic_mm < 1.5 * first.systematic_mm

@@ -11,16 +11,8 @@ from scipy.spatial.transform import Rotation
 from hexacell.errors import IdentifiabilityError
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import Noise
+from hexacell.uncertainty import effect_kinds
 from hexacell.uncertainty.budget import UncertaintyBudget
-from hexacell.uncertainty.effect_kinds import (
-    ball_roundness,
-    common_encoder_scale,
-    common_sag,
-    encoder_scales,
-    rail_directions,
-    rail_waves,
-    stop_repeatability,
-)
 from hexacell.uncertainty.length_check import LengthCheck
 from hexacell.uncertainty.length_records import JudgedGeometry, LengthRecords
 from tests.hexacell.uncertainty.two_seats import TwoSeats
@@ -64,7 +56,7 @@ def test_a_scale_of_all_encoders_is_found_in_every_direction(laboratory, paper, 
     machine = scaled(paper, long_um_m)
     found = laboratory.identified(laboratory.records_of(machine))
     assert found.goodness.chi2 < 1.2 * found.goodness.expected
-    scale = common_encoder_scale(1.0)
+    scale = effect_kinds.common_encoder_scale(1.0)
     taken_up = {scale.name: laboratory.propagation(found).parameter_columns(scale)}
     fixture = seats(name)
     records = fixture.records(laboratory, found, machine)
@@ -106,7 +98,7 @@ def one_scale(paper, leg, um_m):
 @pytest.mark.parametrize("name", ["across", "rails"])
 def test_an_effect_moves_the_result_as_is_propagated(laboratory, exact, paper, name) -> None:
     """Through the records of the identification and those of the check, for one encoder's scale."""
-    effect, machine = encoder_scales(1.0), one_scale(paper, 2, 200.0)
+    effect, machine = effect_kinds.encoder_scales(1.0), one_scale(paper, 2, 200.0)
     propagation = laboratory.propagation(exact)
     columns = {effect.name: propagation.parameter_columns(effect)}
     fixture = seats(name)
@@ -217,13 +209,13 @@ def measured_budget(laboratory, found, machine, fixture, effects):
 
 
 EFFECTS = (
-    common_encoder_scale(1000.0),
-    encoder_scales(10.0),
-    rail_directions(0.02),
-    rail_waves(3.0, 600.0),
-    common_sag(10.0, 800.0),
-    stop_repeatability(2.0),
-    ball_roundness(2.0),
+    effect_kinds.common_encoder_scale(1000.0),
+    effect_kinds.encoder_scales(10.0),
+    effect_kinds.rail_directions(0.02),
+    effect_kinds.rail_waves(3.0, 600.0),
+    effect_kinds.common_sag(10.0, 800.0),
+    effect_kinds.stop_repeatability(2.0),
+    effect_kinds.ball_roundness(2.0),
 )
 
 
@@ -242,7 +234,7 @@ def test_what_a_measured_scale_does_at_the_task_is_known(laboratory, paper, name
 
 def test_what_the_check_shares_with_the_estimate_is_not_counted_as_independent(laboratory, exact, paper):
     """Linear draws of every cause: the error at the task less what is stated, against the budget's."""
-    effects = (common_encoder_scale(30.0), encoder_scales(50.0))
+    effects = (effect_kinds.common_encoder_scale(30.0), effect_kinds.encoder_scales(50.0))
     _, after, observed = measured_budget(laboratory, exact, ideal(paper), seats("oblique"), effects)
     propagation = laboratory.propagation(exact)
     random = np.random.default_rng(4)

@@ -12,56 +12,38 @@ from drivers.controllers.linuxcnc.startup import run_reload_command
 from drivers.errors import ConnectionLost, StartupNotPermitted
 from drivers.interfaces import StartupAction
 from hexacell.errors import DeviceError
-from tests.drivers.controllers.linuxcnc.conftest import (
-    HOMED,
-    HOMING,
-    IN_ESTOP,
-    IN_JOINT_MODE,
-    IS_OFF,
-    IS_ON,
-    MDI_MODE,
-    NO_ERROR,
-    NO_ESTOP,
-    NOT_HOMED,
-    OFF,
-    OPENING,
-    OWN_COORDINATES,
-    READY,
-    SWITCHING_ON,
-    Then,
-    said,
-)
+from tests.drivers.controllers.linuxcnc import conftest as wire
 from tests.waiting import cancel, until
 
 RESTARTED = frozenset({StartupAction.RESET_INITIAL_ESTOP, StartupAction.HOME})
 """What the cell file permits; to be switched on again needs no permission."""
-BEFORE = said("get machine: ON | get joint_pos: -461.827519 1.0 2.0 3.0 4.0 5.0")
-AFTER = said("get joint_pos: -461.827512 1.0 2.0 3.0 4.0 5.0")
-HOMED_AGAIN = [*NOT_HOMED, *OWN_COORDINATES, *IN_JOINT_MODE, *HOMING, *READY]
-REOPENED, DEAF = OPENING[:-1], ("hello EMC hexacell 1.0", Then.HANG_UP)
-RESTARTS, RESET = [*IN_ESTOP, *NOT_HOMED], said("set estop off | get estop: OFF")
-TURNED_OFF = said("set machine off | get machine: OFF")
-ON = [*SWITCHING_ON, *NO_ESTOP, *IS_ON]
+BEFORE = wire.said("get machine: ON | get joint_pos: -461.827519 1.0 2.0 3.0 4.0 5.0")
+AFTER = wire.said("get joint_pos: -461.827512 1.0 2.0 3.0 4.0 5.0")
+HOMED_AGAIN = [*wire.NOT_HOMED, *wire.OWN_COORDINATES, *wire.IN_JOINT_MODE, *wire.HOMING, *wire.READY]
+REOPENED, DEAF = wire.OPENING[:-1], ("hello EMC hexacell 1.0", wire.Then.HANG_UP)
+RESTARTS, RESET = [*wire.IN_ESTOP, *wire.NOT_HOMED], wire.said("set estop off | get estop: OFF")
+TURNED_OFF = wire.said("set machine off | get machine: OFF")
+ON = [*wire.SWITCHING_ON, *wire.NO_ESTOP, *wire.IS_ON]
 
 
 def python(program: str) -> tuple[str, ...]:
     return (sys.executable, "-c", program)
 
 
-RESTARTING = [*BEFORE, TURNED_OFF[0], (*TURNED_OFF[1], Then.HANG_UP)]
+RESTARTING = [*BEFORE, TURNED_OFF[0], (*TURNED_OFF[1], wire.Then.HANG_UP)]
 COMMAND = {"reload_command": python("pass")}
 
 
 @pytest.mark.parametrize(
     ("conversations", "settings"),
     [
-        ([[*BEFORE, *TURNED_OFF, *ON, *HOMED, *AFTER, *MDI_MODE]], {}),
+        ([[*BEFORE, *TURNED_OFF, *ON, *wire.HOMED, *AFTER, *wire.MDI_MODE]], {}),
         # joints that are homed after it, or include zeros, are not compared with where they were
-        ([[*BEFORE, *TURNED_OFF, *ON, *HOMED_AGAIN, *MDI_MODE]], {}),
-        ([[*BEFORE, *TURNED_OFF, *ON, *HOMED, *MDI_MODE]], {"joints_include_zeros": True}),
+        ([[*BEFORE, *TURNED_OFF, *ON, *HOMED_AGAIN, *wire.MDI_MODE]], {}),
+        ([[*BEFORE, *TURNED_OFF, *ON, *wire.HOMED, *wire.MDI_MODE]], {"joints_include_zeros": True}),
         # a command that restarts the controller, which is connected to again as soon as it answers
-        ([RESTARTING, [*REOPENED, *RESTARTS, *RESET, *ON, *HOMED_AGAIN, *MDI_MODE]], COMMAND),
-        ([RESTARTING, [DEAF], [*REOPENED, *ON, *HOMED, *AFTER, *MDI_MODE]], COMMAND),
+        ([RESTARTING, [*REOPENED, *RESTARTS, *RESET, *ON, *HOMED_AGAIN, *wire.MDI_MODE]], COMMAND),
+        ([RESTARTING, [DEAF], [*REOPENED, *ON, *wire.HOMED, *AFTER, *wire.MDI_MODE]], COMMAND),
     ],
 )
 async def test_the_machine_goes_off_and_on(play, conversations, settings):
@@ -72,7 +54,7 @@ async def test_the_machine_goes_off_and_on(play, conversations, settings):
 async def test_the_command_runs_while_the_machine_is_off(play, tmp_path):
     ran = tmp_path / "ran"
     driver = await play.opened(
-        [*BEFORE, *TURNED_OFF, *ON, *HOMED, *AFTER, *MDI_MODE],
+        [*BEFORE, *TURNED_OFF, *ON, *wire.HOMED, *AFTER, *wire.MDI_MODE],
         reload_command=python(f"open({str(ran)!r}, 'w').close()"),
     )
     await driver.reload(RESTARTED)
@@ -85,7 +67,7 @@ async def test_a_machine_that_does_not_go_off_is_not_reloaded(play, tmp_path):
     driver = await play.opened(
         [*BEFORE, TURNED_OFF[0]], reload_command=python(f"open({str(ran)!r}, 'w').close()")
     )
-    play.servers[0].afterwards = dict([TURNED_OFF[0], *IS_ON, NO_ERROR, *NO_ESTOP])
+    play.servers[0].afterwards = dict([TURNED_OFF[0], *wire.IS_ON, wire.NO_ERROR, *wire.NO_ESTOP])
     with pytest.raises(DeviceError, match="does not switch off"):
         await driver.reload(RESTARTED)
     assert not ran.exists()
@@ -107,21 +89,21 @@ async def test_a_command_that_fails_leaves_the_machine_off(play, program, proble
 
 async def test_a_joint_that_moved_is_an_error(play):
     moved = ("get joint_pos", b"JOINT_POS -461.827512 1.0 2.0 9.8 4.0 5.0\r\n")
-    driver = await play.opened([*BEFORE, *TURNED_OFF, *ON, *HOMED, moved])
+    driver = await play.opened([*BEFORE, *TURNED_OFF, *ON, *wire.HOMED, moved])
     with pytest.raises(DeviceError, match=r"moved joint 4 by 6\.800 mm while it read its config again"):
         await driver.reload(RESTARTED)
 
 
 async def test_an_emergency_stop_meanwhile_is_not_reset(play):
     play.patience = play.IMPATIENT
-    driver = await play.opened([*BEFORE, *TURNED_OFF, *IN_ESTOP, *HOMED])
+    driver = await play.opened([*BEFORE, *TURNED_OFF, *wire.IN_ESTOP, *wire.HOMED])
     with pytest.raises(StartupNotPermitted, match="is in emergency stop"):
         await driver.reload(RESTARTED)
 
 
 async def test_after_an_emergency_stop_meanwhile_the_machine_is_not_switched_on_without_permission(play):
-    control = said("set enable EMCTOO | get error: OK | set set_wait done")
-    driver = await play.opened([*BEFORE, *TURNED_OFF, *IN_ESTOP, *HOMED, *control, *OFF])
+    control = wire.said("set enable EMCTOO | get error: OK | set set_wait done")
+    driver = await play.opened([*BEFORE, *TURNED_OFF, *wire.IN_ESTOP, *wire.HOMED, *control, *wire.OFF])
     with pytest.raises(StartupNotPermitted, match="is in emergency stop"):
         await driver.reload(RESTARTED)
     with pytest.raises(StartupNotPermitted, match="is switched off"):
@@ -129,7 +111,7 @@ async def test_after_an_emergency_stop_meanwhile_the_machine_is_not_switched_on_
 
 
 async def test_a_machine_that_was_off_is_not_switched_on_without_permission(play):
-    driver = await play.opened([*IS_OFF, *TURNED_OFF, *OFF])
+    driver = await play.opened([*wire.IS_OFF, *TURNED_OFF, *wire.OFF])
     with pytest.raises(StartupNotPermitted, match="is switched off"):
         await driver.reload(RESTARTED)
 

@@ -7,35 +7,16 @@ import pytest
 from drivers.errors import MotionInterrupted, MoveRefused
 from drivers.interfaces import ControllerStatus, StartupAction
 from hexacell.errors import DeviceError
-from tests.drivers.controllers.linuxcnc.conftest import (
-    ACK,
-    AGAIN_IN_CONTROL,
-    GREETING,
-    HALF_WAY,
-    MDI,
-    MDI_MODE,
-    MOVE_S,
-    MOVED,
-    NAK,
-    NO_ERROR,
-    OWN_COORDINATES,
-    READY,
-    REFUSED,
-    RESTORED,
-    SWITCHING_ON,
-    TAKING_CONTROL,
-    TARGET,
-    said,
-)
+from tests.drivers.controllers.linuxcnc import conftest as wire
 
 JOINTS = "1.000000 2.000000 3.000000 4.000000 5.000000 6.000000"
 
 
 def asked(*, estop: str = "OFF", machine: str = "ON") -> list[tuple[str, bytes]]:
-    return said(f"get machine: {machine} | get estop: {estop} | get joint_pos: {JOINTS}")
+    return wire.said(f"get machine: {machine} | get estop: {estop} | get joint_pos: {JOINTS}")
 
 
-LOOKING_ON = GREETING[:3]
+LOOKING_ON = wire.GREETING[:3]
 """Whoever only looks on does not take control."""
 ON = ControllerStatus(estop=False, enabled=True, heartbeat=JOINTS)
 
@@ -53,7 +34,7 @@ async def test_the_status_is_read_without_taking_control(play) -> None:
 
 
 async def test_error_messages_are_read_when_the_machine_switches_off(play) -> None:
-    told = [*TURNED_OFF, FAULT, NO_ERROR, *TURNED_OFF, NO_ERROR]
+    told = [*TURNED_OFF, FAULT, wire.NO_ERROR, *TURNED_OFF, wire.NO_ERROR]
     driver = await play.opened([], [*LOOKING_ON, *asked(), *told])
     assert await driver.status() == ON
     for _ in range(2):
@@ -62,17 +43,17 @@ async def test_error_messages_are_read_when_the_machine_switches_off(play) -> No
         assert not status.may_move
 
 
-[FAULT] = said("get error: joint 3 following error")
+[FAULT] = wire.said("get error: joint 3 following error")
 TURNED_OFF = asked(machine="OFF")
 
 
 async def test_status_has_the_messages_that_the_order_is_reading(play) -> None:
     """LinuxCNC gives a message once; here the command's connection gets it and is still reading."""
     reading = play.Pause()
-    main = [*REFUSED, FAULT, ("get error", reading, b"ERROR OK\r\n")]
-    driver = await play.opened(main, [*LOOKING_ON, *asked(), *TURNED_OFF, NO_ERROR])
+    main = [*wire.REFUSED, FAULT, ("get error", reading, b"ERROR OK\r\n")]
+    driver = await play.opened(main, [*LOOKING_ON, *asked(), *TURNED_OFF, wire.NO_ERROR])
     await driver.status()
-    moving = await reading.reached_by(driver.move(TARGET, MOVE_S))
+    moving = await reading.reached_by(driver.move(wire.TARGET, wire.MOVE_S))
     status = asyncio.create_task(driver.status())
     reading.set()
     assert (await status).error_messages == ("joint 3 following error",)
@@ -82,10 +63,10 @@ async def test_status_has_the_messages_that_the_order_is_reading(play) -> None:
 
 async def test_an_order_has_the_messages_that_the_status_read(play) -> None:
     refused = play.Pause()
-    main = [(MDI, refused, NAK), *said("get enable: ON | get error: OK")]
-    driver = await play.opened(main, [*LOOKING_ON, *asked(), *TURNED_OFF, FAULT, NO_ERROR])
+    main = [(wire.MDI, refused, wire.NAK), *wire.said("get enable: ON | get error: OK")]
+    driver = await play.opened(main, [*LOOKING_ON, *asked(), *TURNED_OFF, FAULT, wire.NO_ERROR])
     await driver.status()
-    moving = await refused.reached_by(driver.move(TARGET, MOVE_S))
+    moving = await refused.reached_by(driver.move(wire.TARGET, wire.MOVE_S))
     assert (await driver.status()).error_messages == ("joint 3 following error",)
     refused.set()
     with pytest.raises(MoveRefused, match="joint 3 following error"):
@@ -95,7 +76,7 @@ async def test_an_order_has_the_messages_that_the_status_read(play) -> None:
 async def test_a_message_whose_reading_is_cancelled_is_kept(play) -> None:
     reading = play.Pause()
     message = ("get error", reading, FAULT[1])
-    told = [*TURNED_OFF, message, NO_ERROR, *TURNED_OFF, NO_ERROR]
+    told = [*TURNED_OFF, message, wire.NO_ERROR, *TURNED_OFF, wire.NO_ERROR]
     driver = await play.opened([], [*LOOKING_ON, *asked(), *told])
     await driver.status()
     cancelled = await reading.reached_by(driver.status())
@@ -107,17 +88,23 @@ async def test_a_message_whose_reading_is_cancelled_is_kept(play) -> None:
 
 
 async def test_a_machine_that_goes_off_between_its_preparation_and_the_first_status_tells_why(play) -> None:
-    preparation = [*TAKING_CONTROL, *SWITCHING_ON, *READY, *MDI_MODE, *OWN_COORDINATES]
-    driver = await play.opened(preparation, [*LOOKING_ON, *TURNED_OFF, FAULT, NO_ERROR])
+    preparation = [
+        *wire.TAKING_CONTROL,
+        *wire.SWITCHING_ON,
+        *wire.READY,
+        *wire.MDI_MODE,
+        *wire.OWN_COORDINATES,
+    ]
+    driver = await play.opened(preparation, [*LOOKING_ON, *TURNED_OFF, FAULT, wire.NO_ERROR])
     await driver.prepare(frozenset({StartupAction.SWITCH_ON}))
     assert (await driver.status()).error_messages == ("joint 3 following error",)
 
 
 async def test_the_status_is_read_during_a_move(play) -> None:
     arrived = play.Pause()
-    main = [(MDI, arrived, ACK), MOVED[1], RESTORED]
+    main = [(wire.MDI, arrived, wire.ACK), wire.MOVED[1], wire.RESTORED]
     driver = await play.opened(main, [*LOOKING_ON, *asked()])
-    moving = await arrived.reached_by(driver.move(TARGET, MOVE_S))
+    moving = await arrived.reached_by(driver.move(wire.TARGET, wire.MOVE_S))
     assert await driver.status() == ON
     assert not moving.done()
     arrived.set()
@@ -125,7 +112,7 @@ async def test_the_status_is_read_during_a_move(play) -> None:
 
 
 async def test_stopping_uses_the_status_connection(play) -> None:
-    driver = await play.opened([], [*LOOKING_ON, *asked(), AGAIN_IN_CONTROL, *play.STOPPED])
+    driver = await play.opened([], [*LOOKING_ON, *asked(), wire.AGAIN_IN_CONTROL, *play.STOPPED])
     await driver.status()
     await driver.stop()
     assert play.servers[0].connections == 2, "no time is lost on opening a third one"
@@ -162,10 +149,10 @@ async def test_the_status_is_not_read_during_a_stop(play) -> None:
 async def test_a_stop_during_a_move_is_reported_by_the_move(play) -> None:
     """The move raises its own error; the guards need no second stop."""
     stopped = play.Pause()
-    main = [(MDI, stopped, ACK), ("get abs_act_pos", HALF_WAY)]
-    driver = await play.opened(main, [*LOOKING_ON, *asked(), AGAIN_IN_CONTROL, *play.STOPPED])
+    main = [(wire.MDI, stopped, wire.ACK), ("get abs_act_pos", wire.HALF_WAY)]
+    driver = await play.opened(main, [*LOOKING_ON, *asked(), wire.AGAIN_IN_CONTROL, *play.STOPPED])
     await driver.status()
-    moving = await stopped.reached_by(driver.move(TARGET, MOVE_S))
+    moving = await stopped.reached_by(driver.move(wire.TARGET, wire.MOVE_S))
     await driver.stop()
     stopped.set()
     with pytest.raises(MotionInterrupted, match="it was stopped on request"):
@@ -174,10 +161,10 @@ async def test_a_stop_during_a_move_is_reported_by_the_move(play) -> None:
 
 async def test_a_move_that_is_refused_because_a_stop_took_control_was_stopped(play) -> None:
     received = play.Pause()
-    main = [(MDI, received, NAK), *said("get enable: OFF")]
-    driver = await play.opened(main, [*LOOKING_ON, *asked(), AGAIN_IN_CONTROL, *play.STOPPED])
+    main = [(wire.MDI, received, wire.NAK), *wire.said("get enable: OFF")]
+    driver = await play.opened(main, [*LOOKING_ON, *asked(), wire.AGAIN_IN_CONTROL, *play.STOPPED])
     await driver.status()
-    moving = await received.reached_by(driver.move(TARGET, MOVE_S))
+    moving = await received.reached_by(driver.move(wire.TARGET, wire.MOVE_S))
     await driver.stop()
     received.set()
     with pytest.raises(MotionInterrupted, match="was stopped before it moved"):

@@ -17,15 +17,7 @@ import pytest
 from drivers.encoders import bank as plausibility
 from drivers.encoders import can_bus, node_monitor
 from drivers.encoders import node_monitor as alarm_poll
-from tests.drivers.encoders.conftest import (
-    HEARTBEAT,
-    NMT,
-    SDO_ANSWER,
-    SDO_REQUEST,
-    SYNC,
-    RawNode,
-    plain_objects,
-)
+from tests.drivers.encoders import conftest
 
 OPERATIONAL = 0x05
 NODES = range(1, 7)
@@ -98,7 +90,7 @@ class PacedBus:
         self.syncs = 0
         self.busy_s = 0.0
         self.nodes = {
-            node: RawNode(node, _objects(node), counts=counts)
+            node: conftest.RawNode(node, _objects(node), counts=counts)
             for node, counts in zip(NODES, COUNTS, strict=True)
         }
         self._heartbeat_s = heartbeat_s
@@ -147,7 +139,7 @@ class PacedBus:
             self._sent.notify()
 
     @property
-    def _on_the_bus(self) -> dict[int, RawNode]:
+    def _on_the_bus(self) -> dict[int, conftest.RawNode]:
         return {number: node for number, node in self.nodes.items() if number not in self.unplugged}
 
     def _put(self, ready_s: float, can_id: int, data: bytes, *, is_from_driver: bool = False) -> None:
@@ -166,24 +158,24 @@ class PacedBus:
         return winner
 
     def _react(self, frame: Pending) -> None:
-        if frame.can_id == SYNC:
+        if frame.can_id == conftest.SYNC:
             self.syncs += 1
             for node in self._on_the_bus.values():
                 for data in node.positions(self.syncs) if node.state == OPERATIONAL else ():
                     self._put(self._free_s, node.tpdo, data)
-        elif frame.can_id == NMT and frame.data[1] in self._on_the_bus:
+        elif frame.can_id == conftest.NMT and frame.data[1] in self._on_the_bus:
             self.nodes[frame.data[1]].state = {1: OPERATIONAL, 0x80: 0x7F}[frame.data[0]]
-        elif frame.can_id - SDO_REQUEST in self._on_the_bus and frame.data[0] != 0x80:
-            node = self.nodes[frame.can_id - SDO_REQUEST]
-            self._put(self._free_s, SDO_ANSWER + node.node, node.answer_sdo(frame.data))
+        elif frame.can_id - conftest.SDO_REQUEST in self._on_the_bus and frame.data[0] != 0x80:
+            node = self.nodes[frame.can_id - conftest.SDO_REQUEST]
+            self._put(self._free_s, conftest.SDO_ANSWER + node.node, node.answer_sdo(frame.data))
 
     def _put_heartbeats(self) -> None:
         while self._next_heartbeat_s <= self.time.monotonic():
             for node in self._on_the_bus.values():
-                self._put(self._next_heartbeat_s, HEARTBEAT + node.node, bytes((node.state,)))
+                self._put(self._next_heartbeat_s, conftest.HEARTBEAT + node.node, bytes((node.state,)))
             self._next_heartbeat_s += self._heartbeat_s
 
 
 def _objects(node: int) -> dict[tuple[int, int], bytes]:
     """Those of a node with an error register, alarms and warnings, which are read again and again."""
-    return {**plain_objects(node), (0x1001, 0): b"\0", (0x6503, 0): b"\0\0", (0x6505, 0): b"\0\0"}
+    return {**conftest.plain_objects(node), (0x1001, 0): b"\0", (0x6503, 0): b"\0\0", (0x6505, 0): b"\0\0"}

@@ -5,16 +5,8 @@ from typing import Any
 import pytest
 
 from procedures.steps import events
+from tests.faults import promises
 from tests.faults.cell import Site
-from tests.faults.promises import (
-    KILLED,
-    after,
-    finish,
-    history_of,
-    places,
-    require_identical,
-    require_valid,
-)
 from tests.faults.steps import DEVICES, STEPS
 
 TIMEOUT_S = 1.0
@@ -35,22 +27,25 @@ class Puller:
         pulled = {"device": device, "step": step, "back": "failed" if back else ""}
         ended = self._begun(site, step, whole)(site, pull=pulled)
         is_over = self._is_over(site, ended, whole)
-        assert step in places(history_of(site)), "nothing was pulled out"
+        assert step in promises.places(promises.history_of(site)), "nothing was pulled out"
         if not is_over:
-            finish(self._program, site, code=whole.ended.code)
-        require_valid(site.run())
-        require_identical(site, whole.site)
+            promises.finish(self._program, site, code=whole.ended.code)
+        promises.require_valid(site.run())
+        promises.require_identical(site, whole.site)
 
     def _begun(self, site: Site, step: str, whole: Any) -> Any:
         """What comes to the step: the run, or where only a resumed one does, its resumption."""
-        if step in places(whole.history):
+        if step in promises.places(whole.history):
             return self._program.run
-        assert self._program.run(site, **after(places(whole.history)["closing"])).code == KILLED
+        assert (
+            self._program.run(site, **promises.after(promises.places(whole.history)["closing"])).code
+            == promises.KILLED
+        )
         return self._program.resume
 
     def _is_over(self, site: Site, ended: Any, whole: Any) -> bool:
         """Whether nothing is left to be resumed; a config that is not the old one was journalled."""
-        history = history_of(site)
+        history = promises.history_of(site)
         if isinstance(history[-1], events.Ended):
             return True
         assert isinstance(history[-1], events.Interrupted), ended.words

@@ -5,18 +5,9 @@ import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from drivers import interfaces
 from drivers.controllers.linuxcnc.protocol import parse_pose_refusal
 from drivers.errors import GaugeAtEnd, PoseRefused, StartupNotPermitted
-from drivers.interfaces import (
-    ControllerStatus,
-    DeviceIdentity,
-    EncoderSample,
-    GaugeReading,
-    ReportedPosition,
-    StartupAction,
-    StartupActions,
-    TemperatureReading,
-)
 from drivers.simulated.linuxcnc.state import MotionRefused
 from drivers.simulated.robot import SimulatedMachine
 from hexacell.cell.devices import GaugeAxis
@@ -57,10 +48,10 @@ class Fake:
     dead: HexacellError | None = None
     closed = 0
 
-    def _answering(self, *names: str) -> tuple[DeviceIdentity, ...]:
+    def _answering(self, *names: str) -> tuple[interfaces.DeviceIdentity, ...]:
         if self.dead:
             raise self.dead
-        return tuple(DeviceIdentity(name, "fake", "a device") for name in names)
+        return tuple(interfaces.DeviceIdentity(name, "fake", "a device") for name in names)
 
     async def close(self) -> None:
         self.closed += 1
@@ -76,23 +67,23 @@ class FakeGauge(Fake):
         self.void: HexacellError | None = None
         self.reads = 0
 
-    async def open(self) -> DeviceIdentity:
+    async def open(self) -> interfaces.DeviceIdentity:
         return self._answering(self.name)[0]
 
-    async def read(self) -> GaugeReading:
+    async def read(self) -> interfaces.GaugeReading:
         self.reads += 1
         if self.failures:
             raise self.failures.pop(0)
         return self._reading()
 
-    async def read_once(self) -> GaugeReading:
+    async def read_once(self) -> interfaces.GaugeReading:
         return self._reading()
 
-    def _reading(self) -> GaugeReading:
+    def _reading(self) -> interfaces.GaugeReading:
         value = self.shown()
         if abs(value) > HALF_TRAVEL_MM:
             raise GaugeAtEnd("is at an end of its travel", subject=f"gauge {self.name}")
-        return GaugeReading(value, f"{value:+.3f}")
+        return interfaces.GaugeReading(value, f"{value:+.3f}")
 
     async def check(self) -> None:
         if self.void:
@@ -106,15 +97,15 @@ class FakeThermometer(Fake):
         self.name = name
         self.shown = list(shown)
 
-    async def open(self) -> DeviceIdentity:
+    async def open(self) -> interfaces.DeviceIdentity:
         await self.read()
-        return DeviceIdentity(f"thermometer {self.name}", "fake", "a thermometer")
+        return interfaces.DeviceIdentity(f"thermometer {self.name}", "fake", "a thermometer")
 
-    async def read(self) -> TemperatureReading:
+    async def read(self) -> interfaces.TemperatureReading:
         shown = self.shown.pop(0) if len(self.shown) > 1 else self.shown[0]
         if isinstance(shown, Exception):
             raise shown
-        return TemperatureReading(shown, f"{1000 * shown:.0f}")
+        return interfaces.TemperatureReading(shown, f"{1000 * shown:.0f}")
 
 
 class FakeEncoders(Fake):
@@ -124,14 +115,14 @@ class FakeEncoders(Fake):
         self.shown = shown
         self.failure: HexacellError | None = None
 
-    async def open(self) -> tuple[DeviceIdentity, ...]:
+    async def open(self) -> tuple[interfaces.DeviceIdentity, ...]:
         return self._answering(*(f"encoder {leg}" for leg in range(1, 7)))
 
-    async def read(self) -> EncoderSample:
+    async def read(self) -> interfaces.EncoderSample:
         if self.failure:
             raise self.failure
         positions = tuple(float(value) for value in self.shown())
-        return EncoderSample(tuple(round(1000 * value) for value in positions), positions)
+        return interfaces.EncoderSample(tuple(round(1000 * value) for value in positions), positions)
 
 
 def refused(pose: Pose, message: str) -> PoseRefused:
@@ -151,8 +142,8 @@ class FakeController(Fake):
         self.machine: SimulatedMachine | None = None
         self.log: list[str] = []
         self.failures: dict[str, BaseException] = {}
-        self.now = ControllerStatus(estop=False, enabled=True)
-        self.needed: list[StartupAction] = []
+        self.now = interfaces.ControllerStatus(estop=False, enabled=True)
+        self.needed: list[interfaces.StartupAction] = []
         self.durations_s: list[float] = []
 
     def _do(self, order: str, target: str = "") -> None:
@@ -160,14 +151,14 @@ class FakeController(Fake):
         if error := self.failures.pop(order, None):
             raise error
 
-    async def open(self) -> DeviceIdentity:
+    async def open(self) -> interfaces.DeviceIdentity:
         return self._answering("controller")[0]
 
-    async def prepare(self, permitted: StartupActions) -> None:
+    async def prepare(self, permitted: interfaces.StartupActions) -> None:
         self._do("prepare")
         self._start_up(permitted)
 
-    def _start_up(self, permitted: StartupActions) -> None:
+    def _start_up(self, permitted: interfaces.StartupActions) -> None:
         for needed in [action for action in self.needed if action not in permitted]:
             raise StartupNotPermitted(needed, "controller")
         self.log += [action.value for action in self.needed]
@@ -182,16 +173,20 @@ class FakeController(Fake):
             except MotionRefused as refusal:
                 raise refused(pose, str(refusal)) from refusal
 
-    async def position(self) -> ReportedPosition | None:
-        return ReportedPosition(self.machine.pose(), self.machine.joints()) if self.machine else None
+    async def position(self) -> interfaces.ReportedPosition | None:
+        return (
+            interfaces.ReportedPosition(self.machine.pose(), self.machine.joints())
+            if self.machine
+            else None
+        )
 
-    async def status(self) -> ControllerStatus:
+    async def status(self) -> interfaces.ControllerStatus:
         return self.now
 
     async def stop(self) -> None:
         self._do("stop")
 
-    async def reload(self, permitted: StartupActions) -> None:
+    async def reload(self, permitted: interfaces.StartupActions) -> None:
         self._do("reload")
         self._start_up(permitted)
         if self.machine:

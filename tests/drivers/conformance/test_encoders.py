@@ -8,13 +8,7 @@ from tempfile import TemporaryDirectory
 
 import pytest
 
-from drivers.conformance import (
-    ControllerConformance,
-    ControllerTwin,
-    EncoderConformance,
-    EncoderTwin,
-    served_encoder_twin,
-)
+from drivers import conformance
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.encoders.dbc import DbcBank
@@ -33,14 +27,14 @@ TIMEOUT_S = 3.0
 CAN_TIMEOUT_S = 1.5
 
 
-class Cia406(EncoderConformance):
+class Cia406(conformance.EncoderConformance):
     settings: EncoderSettings
 
-    def driver(self, twin: EncoderTwin) -> EncoderBank:
+    def driver(self, twin: conformance.EncoderTwin) -> EncoderBank:
         return Cia406Bank(twin.settings)
 
-    def twin(self) -> AbstractContextManager[EncoderTwin]:
-        return served_encoder_twin(self.settings)
+    def twin(self) -> AbstractContextManager[conformance.EncoderTwin]:
+        return conformance.served_encoder_twin(self.settings)
 
 
 class TestLinear(Cia406):
@@ -89,30 +83,30 @@ class WithItsController:
         await self._controller.close()
 
 
-class TestScalesOfAController(EncoderConformance):
+class TestScalesOfAController(conformance.EncoderConformance):
     name = "controller"
 
-    def driver(self, twin: EncoderTwin) -> EncoderBank:
+    def driver(self, twin: conformance.EncoderTwin) -> EncoderBank:
         assert isinstance(twin, ScalesTwin)
         return WithItsController(twin)
 
     @contextmanager
-    def twin(self) -> Iterator[EncoderTwin]:
+    def twin(self) -> Iterator[conformance.EncoderTwin]:
         machine = MachineThatStands()
         with SimulatedController(machine, ControllerSettings(config="machine.ini")) as server:
             yield ScalesTwin(machine, server)
 
 
-class TestByDbcFile(EncoderConformance):
-    def driver(self, twin: EncoderTwin) -> EncoderBank:
+class TestByDbcFile(conformance.EncoderConformance):
+    def driver(self, twin: conformance.EncoderTwin) -> EncoderBank:
         return DbcBank(twin.settings)
 
     @contextmanager
-    def twin(self) -> Iterator[EncoderTwin]:
+    def twin(self) -> Iterator[conformance.EncoderTwin]:
         with TemporaryDirectory() as folder:
             (Path(folder) / "encoders.dbc").write_text(dbc_text())
             described = {"file": f"{folder}/encoders.dbc", "signals": SIGNALS, "request": "080#"}
-            with served_encoder_twin(
+            with conformance.served_encoder_twin(
                 LinearEncoderSettings.model_validate(
                     {"protocol": "dbc", "timeout_s": TIMEOUT_S, "measuring_step_nm": 500, "dbc": described}
                 )
@@ -120,15 +114,15 @@ class TestByDbcFile(EncoderConformance):
                 yield twin
 
 
-class TestModbusOfOneDevice(EncoderConformance):
+class TestModbusOfOneDevice(conformance.EncoderConformance):
     modbus: Mapping[str, object] = {"registers": (0, 2, 4, 6, 8, 10)}
 
-    def driver(self, twin: EncoderTwin) -> EncoderBank:
+    def driver(self, twin: conformance.EncoderTwin) -> EncoderBank:
         return ModbusBank(twin.settings)
 
-    def twin(self) -> AbstractContextManager[EncoderTwin]:
+    def twin(self) -> AbstractContextManager[conformance.EncoderTwin]:
         stated = {"protocol": "modbus", "timeout_s": TIMEOUT_S, "modbus": self.modbus}
-        return served_encoder_twin(LinearEncoderSettings.model_validate(stated))
+        return conformance.served_encoder_twin(LinearEncoderSettings.model_validate(stated))
 
 
 class TestModbusOfSixDevicesThatLatch(TestModbusOfOneDevice):
@@ -150,7 +144,7 @@ def test_samples_of_two_instants_are_found() -> None:
             )
 
     class Conformance(TestLinear):
-        def driver(self, twin: EncoderTwin) -> EncoderBank:
+        def driver(self, twin: conformance.EncoderTwin) -> EncoderBank:
             return OneAfterTheOther(twin.settings)
 
     with pytest.raises(AssertionError):
@@ -193,11 +187,11 @@ class LinuxcncTwin:
                 self._server.state.set_estop(on=on)
 
 
-class TestLinuxcncrsh(ControllerConformance):
+class TestLinuxcncrsh(conformance.ControllerConformance):
     def driver(self, settings: ControllerSettings) -> Controller:
         return LinuxcncrshController(settings, timeouts=HASTY)
 
     @contextmanager
-    def twin(self) -> Iterator[ControllerTwin]:
+    def twin(self) -> Iterator[conformance.ControllerTwin]:
         with SimulatedController(MachineInTime(), ControllerSettings(config="machine.ini")) as server:
             yield LinuxcncTwin(server)

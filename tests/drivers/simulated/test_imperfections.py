@@ -6,13 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.simulated.imperfections import (
-    SEATED_N,
-    Backlash,
-    LoadedMachine,
-    leg_tensions,
-    with_longer_legs,
-)
+from drivers.simulated import imperfections
 from drivers.simulated.physics import RobotPhysics
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
@@ -64,7 +58,7 @@ class Machine:
 
     def loaded(self, row: int, warmer_k: float = 0.0) -> PoseBatch:
         """Where the platform is with the joints that would bring it to a pose without imperfections."""
-        machine = LoadedMachine(self.mechanism, self.geometry, self.settings)
+        machine = imperfections.LoadedMachine(self.mechanism, self.geometry, self.settings)
         found = machine.pose(self.joints[row], warmer_k, self.poses[[row]])
         assert found.found[0]
         return found.poses
@@ -98,12 +92,12 @@ def test_without_imperfections_the_pose_is_that_of_the_geometry(name: str) -> No
     start = machine.poses[[0]]
     for row in range(len(machine.poses)):
         exact = forward_kinematics(machine.mechanism, machine.geometry, machine.joints[[row]], start).poses
-        seen = LoadedMachine(machine.mechanism, machine.geometry, machine.settings).pose(
+        seen = imperfections.LoadedMachine(machine.mechanism, machine.geometry, machine.settings).pose(
             machine.joints[row], 0.0, start
         )
         assert np.array_equal(seen.poses.positions, exact.positions)
         assert np.array_equal(seen.poses.rotations, exact.rotations)
-        backlash = Backlash(np.zeros(6), machine.joints[0], np.random.default_rng(1))
+        backlash = imperfections.Backlash(np.zeros(6), machine.joints[0], np.random.default_rng(1))
         assert np.array_equal(backlash.follow(machine.joints[row]), machine.joints[row])
 
 
@@ -115,7 +109,7 @@ def test_legs_are_in_balance_with_the_weight(name: str, load: SimulatedLoad) -> 
     """Forces, moments about the base's origin, and virtual work: lengths times forces are its work."""
     machine = Machine(name)
     mechanism, geometry, poses, joints = machine.mechanism, machine.geometry, machine.poses, machine.joints
-    tensions = leg_tensions(mechanism, geometry, poses, joints, load)
+    tensions = imperfections.leg_tensions(mechanism, geometry, poses, joints, load)
     legs = mechanism.legs(geometry, poses, joints)
     for row in range(len(poses)):
         ends = legs.platform_joints[row]
@@ -126,7 +120,7 @@ def test_legs_are_in_balance_with_the_weight(name: str, load: SimulatedLoad) -> 
         of_weight = np.cross(poses.positions[row] + poses.rotations[row] @ centre, force)
         assert np.cross(ends, pulls).sum(axis=0) == pytest.approx(-of_weight, abs=1e-5)
         for leg in range(6):
-            changes = with_longer_legs(
+            changes = imperfections.with_longer_legs(
                 mechanism, geometry, joints[[row]], poses[[row]], 1e-3 * np.eye(6)[leg]
             )
             longer = forward_kinematics(mechanism, *changes, poses[[row]]).poses
@@ -139,7 +133,7 @@ def test_legs_yield_by_their_forces_and_the_weight_sinks(name: str) -> None:
     mechanism, geometry = machine.mechanism, machine.geometry
     for row in range(len(machine.poses)):
         poses, joints = machine.loaded(row), machine.joints[[row]]
-        tensions = leg_tensions(mechanism, geometry, poses, joints, machine.settings.load)[0]
+        tensions = imperfections.leg_tensions(mechanism, geometry, poses, joints, machine.settings.load)[0]
         assert longer_by(machine, row, poses) == pytest.approx(
             1e-3 * np.array(COMPLIANCE) * tensions, abs=1e-8
         )
@@ -155,8 +149,8 @@ def test_legs_with_play_lie_at_the_end_to_which_the_weight_brings_them(name: str
     for row in range(len(machine.poses)):
         poses, joints = machine.loaded(row), machine.joints[[row]]
         load = machine.settings.load
-        tensions = leg_tensions(machine.mechanism, machine.geometry, poses, joints, load)[0]
-        seated = np.interp(tensions, [-SEATED_N, SEATED_N], [-1.0, 1.0])
+        tensions = imperfections.leg_tensions(machine.mechanism, machine.geometry, poses, joints, load)[0]
+        seated = np.interp(tensions, [-imperfections.SEATED_N, imperfections.SEATED_N], [-1.0, 1.0])
         longer = longer_by(machine, row, poses)
         assert longer == pytest.approx(0.5 * np.array(PLAY) * seated, abs=1e-7)
         assert machine.work(row, poses, load) > 0.0
@@ -271,8 +265,8 @@ def test_all_of_them_together_add_up_in_the_lengths_of_the_legs() -> None:
     grown = 1.0 + 5.0 * 11.5e-6
     warm, pose = Geometry(machine.mechanism.parameters, machine.geometry.vector * grown), physics._pose
     joints = (machine.joints[[1]] + 0.03) * grown
-    tensions = leg_tensions(machine.mechanism, warm, pose, joints, load)[0]
-    assert np.abs(tensions).min() > SEATED_N
+    tensions = imperfections.leg_tensions(machine.mechanism, warm, pose, joints, load)[0]
+    assert np.abs(tensions).min() > imperfections.SEATED_N
     longer = 0.5 * np.array(PLAY) * np.sign(tensions) + 1e-3 * np.array(COMPLIANCE) * tensions
     ends = pose.positions[0] + warm["platform"] @ pose.rotations[0].T
     lengths = np.linalg.norm(ends - warm["base"], axis=1)

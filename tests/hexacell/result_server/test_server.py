@@ -23,15 +23,8 @@ from cryptography.x509.oid import ExtendedKeyUsageOID
 from hexacell.cell.loader import Cell
 from hexacell.cell.operation import OpcUaSettings
 from hexacell.errors import DeviceError, FileError, UsageError
+from hexacell.result_server import server
 from hexacell.result_server import server as server_module
-from hexacell.result_server.server import (
-    MOST_RESULTS,
-    NAMESPACE,
-    Reader,
-    allowed_reader,
-    ensure_certificate,
-    serve_results,
-)
 from hexacell.runs.run_folder import runs_folder
 from hexacell.verdict.decision import Verdict
 from procedures.run.cancellation import cancel_and_wait
@@ -78,7 +71,7 @@ async def serving(
     """The address of a server that runs."""
     settings = OpcUaSettings(port=closed_port(), poll_s=0.05, **further)
     address = asyncio.get_running_loop().create_future()
-    task = asyncio.create_task(serve_results(cell, settings, address.set_result, warn))
+    task = asyncio.create_task(server.serve_results(cell, settings, address.set_result, warn))
     await asyncio.wait({task, address}, return_when=asyncio.FIRST_COMPLETED)
     if task.done():
         task.result()
@@ -104,7 +97,7 @@ async def reading(
 
 async def results(client: Client, cell: Cell) -> dict[str, dict[str, Any]]:
     """All results by their names, with the values of all their variables."""
-    number = await client.get_namespace_index(NAMESPACE)
+    number = await client.get_namespace_index(server.NAMESPACE)
     path = [f"{number}:{name}" for name in (cell.settings.name, "ResultManagement", "Results")]
     folder = await client.nodes.objects.get_child(path)
     found: dict[str, dict[str, Any]] = {}
@@ -155,7 +148,7 @@ async def test_the_reader_alone_gets_in_reads_results_changes_none_and_is_told_e
         assert math.isnan(values["PositionErrorMm"])
         await _changes_nothing(client, cell, "2026-11-01T100000Z")
 
-        number = await client.get_namespace_index(NAMESPACE)
+        number = await client.get_namespace_index(server.NAMESPACE)
         kind = await client.nodes.base_event_type.get_child(f"{number}:ResultReadyEventType")
         management = await client.nodes.objects.get_child(
             [f"{number}:{name}", f"{number}:ResultManagement"]
@@ -163,9 +156,9 @@ async def test_the_reader_alone_gets_in_reads_results_changes_none_and_is_told_e
         heard = Heard()
         subscription = await client.create_subscription(20, heard)
         await subscription.subscribe_events(management, kind)
-        days = range(2, MOST_RESULTS + 3)
-        verdicts = [Verdict.FAIL, Verdict.CONDITIONAL_PASS, None, *[Verdict.PASS] * MOST_RESULTS]
-        expected = [(2, 800), (3, 500), (0, 500), *[(1, 100)] * MOST_RESULTS]
+        days = range(2, server.MOST_RESULTS + 3)
+        verdicts = [Verdict.FAIL, Verdict.CONDITIONAL_PASS, None, *[Verdict.PASS] * server.MOST_RESULTS]
+        expected = [(2, 800), (3, 500), (0, 500), *[(1, 100)] * server.MOST_RESULTS]
         for day, verdict, (evaluation, severity) in zip(days, verdicts, expected, strict=False):
             propose_run(cell, f"2026-11-{day:02}T100000Z", verdict=verdict)
             event = await heard.told.get()
@@ -174,7 +167,7 @@ async def test_the_reader_alone_gets_in_reads_results_changes_none_and_is_told_e
             assert event.Message.Text == "over"
         assert heard.told.empty()
         left = sorted(await results(client, cell))
-    assert left == [f"{name}/2026-11-{day:02}T100000Z" for day in days][-MOST_RESULTS:]
+    assert left == [f"{name}/2026-11-{day:02}T100000Z" for day in days][-server.MOST_RESULTS :]
 
 
 async def _only_the_reader_gets_in(address: str, client_files: tuple[Path, Path]) -> None:
@@ -195,7 +188,7 @@ async def _only_the_reader_gets_in(address: str, client_files: tuple[Path, Path]
 
 
 async def _changes_nothing(client: Client, cell: Cell, run: str) -> None:
-    number = await client.get_namespace_index(NAMESPACE)
+    number = await client.get_namespace_index(server.NAMESPACE)
     name = cell.settings.name
     path = (name, "ResultManagement", "Results", f"{name}/{run}")
     node = await client.nodes.objects.get_child([f"{number}:{one}" for one in path])
@@ -254,8 +247,10 @@ async def test_a_password_that_others_can_read_and_a_port_that_is_taken_are_refu
         taken.listen()
         settings = OpcUaSettings(port=taken.getsockname()[1])
         with pytest.raises(DeviceError, match="cannot be served"):
-            await serve_results(cell, settings, lambda _: None, lambda _: None)
-    assert allowed_reader(settings, cell.path.parent) == Reader(USER, PASSWORD), "of the environment"
+            await server.serve_results(cell, settings, lambda _: None, lambda _: None)
+    assert server.allowed_reader(settings, cell.path.parent) == server.Reader(USER, PASSWORD), (
+        "of the environment"
+    )
     monkeypatch.delenv("HEXACELL_OPCUA_USER")
     password_file(cell, 0o644)
     with pytest.raises(FileError, match="chmod 600") as raised:
@@ -266,8 +261,8 @@ async def test_a_password_that_others_can_read_and_a_port_that_is_taken_are_refu
 
 def test_its_certificate_stays_and_its_key_is_its_own(tmp_path) -> None:
     folder = tmp_path / "opcua"
-    first = [path.read_bytes() for path in ensure_certificate(folder, "urn:x", "127.0.0.1")]
-    again = [path.read_bytes() for path in ensure_certificate(folder, "urn:x", "127.0.0.1")]
+    first = [path.read_bytes() for path in server.ensure_certificate(folder, "urn:x", "127.0.0.1")]
+    again = [path.read_bytes() for path in server.ensure_certificate(folder, "urn:x", "127.0.0.1")]
     assert first == again
     assert stat.S_IMODE((folder / "private-key.pem").stat().st_mode) == 0o600
     assert x509.load_der_x509_certificate(first[0]).not_valid_after_utc.year >= 2036

@@ -6,19 +6,11 @@ from typing import Any
 
 import pytest
 
+from hexacell import errors
 from hexacell.config.change import Receipt
 from hexacell.config.layout import ConfigLayout
 from hexacell.config.versions import ConfigEditedSince
 from hexacell.config.write_record import NumberChange, later_approval
-from hexacell.errors import (
-    AnswerNeeded,
-    CellBusy,
-    ExitCode,
-    FileError,
-    LimitError,
-    UsageError,
-    WriteBackUndone,
-)
 from hexacell.kinematics.corrections import Corrections
 from hexacell.runs.cell_lock import cell_lock
 from hexacell.runs.run_folder import RunFolder
@@ -63,7 +55,7 @@ async def apply(run: ProposedRun, person: Person | UnattendedOperator | None = N
 
 async def test_a_proposal_is_written_bit_for_bit_and_can_be_undone(cell) -> None:
     run = propose_run(cell)
-    with cell_lock(cell.config_path), pytest.raises(CellBusy):
+    with cell_lock(cell.config_path), pytest.raises(errors.CellBusy):
         await apply(run)
     assert cell.config_path.read_bytes() == run.before
     assert await apply(run) == COMMAND
@@ -80,9 +72,9 @@ async def test_a_proposal_is_written_bit_for_bit_and_can_be_undone(cell) -> None
 @pytest.mark.parametrize(("gate", "consent"), [(DOUBTFUL, "yes"), (GRAVE, "simulated-hexaglide")])
 async def test_gates_need_the_person_that_they_needed_in_the_run(cell, gate, consent: str) -> None:
     run = propose_run(cell, gates=(MET, gate))
-    with pytest.raises(AnswerNeeded, match=gate.sentence) as refusal:
+    with pytest.raises(errors.AnswerNeeded, match=gate.sentence) as refusal:
         await apply(run)
-    assert refusal.value.exit_code is ExitCode.ANSWER_NEEDED
+    assert refusal.value.exit_code is errors.ExitCode.ANSWER_NEEDED
     assert cell.config_path.read_bytes() == run.before
     person = Person()
     assert await apply(run, person) == "a tester"
@@ -97,7 +89,7 @@ async def test_gates_need_the_person_that_they_needed_in_the_run(cell, gate, con
 async def test_what_did_not_pass_needs_a_person(cell, verdict: Verdict | None) -> None:
     run = propose_run(cell, verdict=verdict)
     told = f"Its verification: 0.1 mm: {verdict.value}" if verdict else "No held-out record has verified it"
-    with pytest.raises(AnswerNeeded, match=told):
+    with pytest.raises(errors.AnswerNeeded, match=told):
         await apply(run)
     await apply(run, Person())
     assert cell.config_path.read_bytes() == run.after
@@ -110,16 +102,16 @@ async def test_what_did_not_pass_needs_a_person(cell, verdict: Verdict | None) -
 async def test_what_nobody_may_accept_is_refused(cell, gates, verification) -> None:
     run = propose_run(cell, gates=gates, verdict=Verdict.FAIL, **verification)
     person = Person()
-    with pytest.raises(LimitError, match="the new geometry is refused") as refusal:
+    with pytest.raises(errors.LimitError, match="the new geometry is refused") as refusal:
         await apply(run, person)
-    assert refusal.value.exit_code is ExitCode.OUT_OF_LIMITS
+    assert refusal.value.exit_code is errors.ExitCode.OUT_OF_LIMITS
     assert person.asked == []
     assert cell.config_path.read_bytes() == run.before
 
 
 async def test_who_declines_changes_nothing(cell) -> None:
     run = propose_run(cell, gates=(DOUBTFUL,))
-    with pytest.raises(LimitError, match="was declined; nothing was applied"):
+    with pytest.raises(errors.LimitError, match="was declined; nothing was applied"):
         await apply(run, Person(None))
     assert cell.config_path.read_bytes() == run.before
     assert later_approval(run.folder) is None
@@ -182,7 +174,7 @@ async def test_corrections_that_are_not_those_of_the_journal_are_refused(cell) -
     run = propose_run(cell, corrections=CORRECTED)
     other = propose_run(cell, "2026-11-20T110000Z", corrections=Corrections(backlash=(1.0,) * 6))
     run.folder.proposal.write_bytes(other.folder.proposal.read_bytes())
-    with pytest.raises(FileError, match="not the one of its journal"):
+    with pytest.raises(errors.FileError, match="not the one of its journal"):
         await apply(run)
 
 
@@ -203,9 +195,9 @@ async def test_a_write_that_fails_is_undone_and_approved_by_nobody(cell, monkeyp
         written(path, data + b"#" if data == run.after else data, **options)
 
     monkeypatch.setattr(atomic_files, "write_atomically", garbled)
-    with pytest.raises(WriteBackUndone) as failure:
+    with pytest.raises(errors.WriteBackUndone) as failure:
         await apply(run)
-    assert failure.value.exit_code is ExitCode.WRITE_BACK_UNDONE
+    assert failure.value.exit_code is errors.ExitCode.WRITE_BACK_UNDONE
     assert cell.config_path.read_bytes() == run.before
     assert later_approval(run.folder) is None
 
@@ -217,14 +209,14 @@ async def test_a_proposal_of_another_run_or_behind_a_link_is_refused(cell, tmp_p
     other.folder.proposal.rename(elsewhere)
     other.folder.proposal.symlink_to(elsewhere)
     for one in (run, other):
-        with pytest.raises(FileError, match="is not the one of its journal"):
+        with pytest.raises(errors.FileError, match="is not the one of its journal"):
             read_proposal(one.folder)
 
 
 def test_a_run_without_a_proposal_is_refused(cell, tmp_path) -> None:
     run = propose_run(cell)
     run.folder.proposal.unlink()
-    with pytest.raises(UsageError, match="proposed no change"):
+    with pytest.raises(errors.UsageError, match="proposed no change"):
         read_proposal(run.folder)
-    with pytest.raises(FileError, match="cannot be read"):
+    with pytest.raises(errors.FileError, match="cannot be read"):
         read_proposal(RunFolder(tmp_path))

@@ -6,17 +6,8 @@ from typing import Any
 
 import pytest
 
+from hexacell import errors
 from hexacell.cell.operation import UnattendedSettings
-from hexacell.errors import (
-    CellBusy,
-    DeviceError,
-    ExitCode,
-    FileError,
-    HexacellError,
-    OutOfTime,
-    UsageError,
-    WriteBackUndone,
-)
 from hexacell.measurements.csv_file import read_measurements
 from hexacell.runs.run_folder import RunFolder, find_run, read_attempts, runs_folder
 from hexacell.services.history.past_runs import past_runs, reason_to_keep
@@ -35,7 +26,7 @@ from procedures.steps import events
 from tests.hexacell.services.conftest import order_of
 
 NIGHT = datetime(2026, 3, 3, 2, 30, tzinfo=UTC)
-UNPLUGGED = DeviceError("does not answer", subject="gauge y")
+UNPLUGGED = errors.DeviceError("does not answer", subject="gauge y")
 
 
 def settings_with(cell: Any, **unattended: Any) -> Any:
@@ -49,7 +40,7 @@ class Refusing:
 
     request: RunRequest
 
-    def __call__(self, error: HexacellError = UNPLUGGED, minutes: float = 0.0) -> float | None:
+    def __call__(self, error: errors.HexacellError = UNPLUGGED, minutes: float = 0.0) -> float | None:
         return refused_start(self.request, error, NIGHT, NIGHT + timedelta(minutes=minutes))
 
 
@@ -72,15 +63,15 @@ def test_a_night_that_was_refused_is_in_the_history_with_its_reason(refused) -> 
 
 def test_what_may_pass_is_tried_again_while_its_window_is_open(refused) -> None:
     assert [refused(minutes=minutes) for minutes in (0, 40, 41)] == [1200.0, 1200.0, None]
-    for error in (UNPLUGGED, CellBusy("in use"), OutOfTime("quiet hours")):
+    for error in (UNPLUGGED, errors.CellBusy("in use"), errors.OutOfTime("quiet hours")):
         assert refused(error) is not None
-    for mistake in (UsageError("no accepted result"), FileError("cannot be read")):
+    for mistake in (errors.UsageError("no accepted result"), errors.FileError("cannot be read")):
         assert refused(mistake) is None
 
 
 def test_a_disk_that_takes_no_note_changes_nothing_else(refused, monkeypatch) -> None:
     def full(*_: object) -> None:
-        raise FileError("no space left on device")
+        raise errors.FileError("no space left on device")
 
     monkeypatch.setattr("hexacell.services.unattended.unattended_runs.note_attempt", full)
     assert refused() == 1200.0
@@ -88,11 +79,11 @@ def test_a_disk_that_takes_no_note_changes_nothing_else(refused, monkeypatch) ->
 
 def test_a_refused_night_is_no_run_to_resume_and_a_damaged_note_is_named(refused) -> None:
     refused()
-    with pytest.raises(UsageError, match="the run 'night' never began"):
+    with pytest.raises(errors.UsageError, match="the run 'night' never began"):
         find_run(refused.request.cell, "night")
     folder = refused.request.folder
     folder.attempts.write_text("{}")
-    with pytest.raises(FileError, match=r"not-begun\.json"):
+    with pytest.raises(errors.FileError, match=r"not-begun\.json"):
         read_attempts(folder)
     [night] = past_runs(refused.request.cell)
     assert "not-begun.json" in night.summary.line
@@ -100,9 +91,9 @@ def test_a_refused_night_is_no_run_to_resume_and_a_damaged_note_is_named(refused
 
 def test_quiet_hours_say_when_they_end(make_cell) -> None:
     settings = settings_with(make_cell(), quiet_hours=("02:00-04:00",))
-    with pytest.raises(OutOfTime, match="quiet hours of the cell, until 04:00") as refusal:
+    with pytest.raises(errors.OutOfTime, match="quiet hours of the cell, until 04:00") as refusal:
         refuse_quiet_hours(settings, NIGHT)
-    assert refusal.value.exit_code == ExitCode.OUT_OF_TIME
+    assert refusal.value.exit_code == errors.ExitCode.OUT_OF_TIME
     refuse_quiet_hours(settings, NIGHT + timedelta(hours=2))
 
 
@@ -143,16 +134,18 @@ async def test_it_ends_at_its_reference_and_can_be_resumed(make_site, finished) 
             queue.put(EndAtReference("it lasted longer than longest_minutes = 1"))
 
     before = site.config
-    with pytest.raises(OutOfTime, match="the run was ended: it lasted longer than longest_minutes = 1"):
+    with pytest.raises(
+        errors.OutOfTime, match="the run was ended: it lasted longer than longest_minutes = 1"
+    ):
         await calibrate(site.order(resume=True), [count], queue)
     state = fold(read_journal(site.folder.journal))
     assert state.at_pose is None or state.at_pose[1] == 1
     assert site.happened(events.Arrived)[-1].orientation == 1
     interrupted = site.happened(events.Interrupted)[-1]
-    assert interrupted.exit_code == ExitCode.OUT_OF_TIME
+    assert interrupted.exit_code == errors.ExitCode.OUT_OF_TIME
     assert site.config == before
     ended = await site.calibrate(resume=True)
-    assert ended.exit_code == ExitCode.DONE
+    assert ended.exit_code == errors.ExitCode.DONE
     assert len(read_measurements(site.folder.measurements)) == 24
 
 
@@ -165,7 +158,9 @@ async def test_after_the_write_back_an_unverified_geometry_does_not_stay(make_si
         if isinstance(event, events.RecordTaken) and event.at.phase is Phase.AFTER:
             queue.put(EndAtReference("quiet hours begin at 05:30"))
 
-    with pytest.raises(WriteBackUndone, match=r"the old config is back\. the run was ended") as refusal:
+    with pytest.raises(
+        errors.WriteBackUndone, match=r"the old config is back\. the run was ended"
+    ) as refusal:
         await calibrate(site.order(resume=True), [end], queue)
-    assert refusal.value.exit_code == ExitCode.WRITE_BACK_UNDONE
+    assert refusal.value.exit_code == errors.ExitCode.WRITE_BACK_UNDONE
     assert site.config == before

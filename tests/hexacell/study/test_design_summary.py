@@ -6,28 +6,23 @@ from math import isnan
 import pytest
 
 from hexacell.cli.commands.study import STUDIES, design_lines
+from hexacell.study import design_study
 from hexacell.study.design_records import OrientationChoice
-from hexacell.study.design_study import (
-    DesignOutcome,
-    DesignTrial,
-    RecordsAccuracy,
-    design_summary,
-    design_trials_of,
-)
 
 
-def outcome(trial: DesignTrial) -> DesignOutcome:
+def outcome(trial: design_study.DesignTrial) -> design_study.DesignOutcome:
     """Errors that grow with the robot's number, the noise, and the choice's place in the list."""
     factor = 1 + list(OrientationChoice).index(trial.choice)
     error = factor * (trial.number + 1) * trial.noise_mm
     accuracies = tuple(
-        RecordsAccuracy(11 * points, error, 0.1 * error, 0.01 * error) for points in (2, 3, 4, 5)
+        design_study.RecordsAccuracy(11 * points, error, 0.1 * error, 0.01 * error)
+        for points in (2, 3, 4, 5)
     )
-    return DesignOutcome(accuracies, 4.0)
+    return design_study.DesignOutcome(accuracies, 4.0)
 
 
 def study(robots: int):
-    return design_summary({one: outcome(one) for one in design_trials_of(robots)})
+    return design_study.design_summary({one: outcome(one) for one in design_study.design_trials_of(robots)})
 
 
 def test_each_figure_is_of_its_own_trials() -> None:
@@ -43,13 +38,13 @@ def test_each_figure_is_of_its_own_trials() -> None:
 
 
 def test_robots_that_are_not_identified_are_counted() -> None:
-    outcomes = {one: outcome(one) for one in design_trials_of(2)}
+    outcomes = {one: outcome(one) for one in design_study.design_trials_of(2)}
     outcomes |= {
-        one: DesignOutcome(reason="out of reach")
+        one: design_study.DesignOutcome(reason="out of reach")
         for one in outcomes
         if one.number == 1 or one.choice is OrientationChoice.PAPER
     }
-    found = design_summary(outcomes)
+    found = design_study.design_summary(outcomes)
     assert (found.choices["random"].tried, found.choices["random"].by_records[55].robots) == (2, 1)
     assert found.choices["paper"].by_records == {}
     assert isnan(found.noise_ratio["paper"])

@@ -6,30 +6,22 @@ from html.parser import HTMLParser
 import pytest
 
 from hexacell.errors import UsageError
-from hexacell.text.report.pages import (
-    Chapter,
-    Facts,
-    Paragraph,
-    Picture,
-    Report,
-    Table,
-    Tone,
-    html_of,
-    pdf_of,
-)
+from hexacell.text.report import pages
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><rect width="9" height="9"/></svg>'
 
 
-def report(text: str) -> Report:
+def report(text: str) -> pages.Report:
     blocks = (
-        Paragraph(text),
-        Paragraph(text, is_strong=True),
-        Facts(((text, text),)),
-        Table((text, text), ((text, text),)),
-        Picture(SVG, text),
+        pages.Paragraph(text),
+        pages.Paragraph(text, is_strong=True),
+        pages.Facts(((text, text),)),
+        pages.Table((text, text), ((text, text),)),
+        pages.Picture(SVG, text),
     )
-    return Report(text, text, date(2026, 11, 23), text, Tone.GOOD, (Chapter(text, blocks),))
+    return pages.Report(
+        text, text, date(2026, 11, 23), text, pages.Tone.GOOD, (pages.Chapter(text, blocks),)
+    )
 
 
 class Reader(HTMLParser):
@@ -63,24 +55,24 @@ HOSTILE = [
 
 def test_hostile_texts_stay_texts() -> None:
     for text in HOSTILE:
-        page = html_of(report(text))
-        assert read(page).tags == read(html_of(report("plain"))).tags
+        page = pages.html_of(report(text))
+        assert read(page).tags == read(pages.html_of(report("plain"))).tags
         assert "".join(read(page).text).count(text) >= 9
-        assert pdf_of(report(text)).startswith(b"%PDF")
+        assert pages.pdf_of(report(text)).startswith(b"%PDF")
 
 
 def test_both_are_the_same_each_time_and_need_nothing_else() -> None:
-    page = html_of(report("a <b> & c"))
-    assert page == html_of(report("a <b> & c"))
+    page = pages.html_of(report("a <b> & c"))
+    assert page == pages.html_of(report("a <b> & c"))
     assert "default-src 'none'" in page
     assert not {"script", "link", "img", "iframe"} & set(read(page).tags)
-    made = pdf_of(report("a <b> & c"))
-    assert made == pdf_of(report("a <b> & c"))
+    made = pages.pdf_of(report("a <b> & c"))
+    assert made == pages.pdf_of(report("a <b> & c"))
     assert b"pdfaid:part>2<" in made.replace(b" ", b"")
 
 
 def test_without_typst_the_way_to_it_is_told(monkeypatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "typst", None)
     with pytest.raises(UsageError, match="a PDF needs the package typst") as refusal:
-        pdf_of(report("x"))
+        pages.pdf_of(report("x"))
     assert "hexacell[pdf]" in (refusal.value.action or "")

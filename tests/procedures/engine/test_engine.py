@@ -6,16 +6,7 @@ from unittest.mock import Mock
 
 import pytest
 
-from hexacell.errors import (
-    AnswerNeeded,
-    DeviceError,
-    ExitCode,
-    FileError,
-    Interruption,
-    LimitError,
-    SeveralErrors,
-    WriteBackUndone,
-)
+from hexacell import errors
 from hexacell.verdict.decision import Verdict
 from procedures.engine.engine import Engine
 from procedures.journal.journal import read_journal
@@ -100,13 +91,16 @@ async def test_listeners_receive_events_that_are_on_the_disk(script, journal, pa
 @pytest.mark.parametrize(
     ("error", "code"),
     [
-        (DeviceError("does not answer", subject="gauge x"), ExitCode.HARDWARE),
-        (LimitError("drifted"), ExitCode.OUT_OF_LIMITS),
-        (AnswerNeeded("the run is unattended"), ExitCode.ANSWER_NEEDED),
-        (WriteBackUndone("undone"), ExitCode.WRITE_BACK_UNDONE),
-        (FileError("changed"), ExitCode.USAGE),
-        (SeveralErrors("two", [LimitError("drifted"), DeviceError("dead")]), ExitCode.HARDWARE),
-        (ZeroDivisionError("division by zero"), ExitCode.FAULT),
+        (errors.DeviceError("does not answer", subject="gauge x"), errors.ExitCode.HARDWARE),
+        (errors.LimitError("drifted"), errors.ExitCode.OUT_OF_LIMITS),
+        (errors.AnswerNeeded("the run is unattended"), errors.ExitCode.ANSWER_NEEDED),
+        (errors.WriteBackUndone("undone"), errors.ExitCode.WRITE_BACK_UNDONE),
+        (errors.FileError("changed"), errors.ExitCode.USAGE),
+        (
+            errors.SeveralErrors("two", [errors.LimitError("drifted"), errors.DeviceError("dead")]),
+            errors.ExitCode.HARDWARE,
+        ),
+        (ZeroDivisionError("division by zero"), errors.ExitCode.FAULT),
     ],
 )
 async def test_an_error_stops_motion_before_it_is_journalled(script, journal, bench, error, code):
@@ -145,16 +139,16 @@ async def test_repeated_cancellation_does_not_prevent_the_stop(script, journal, 
 
 
 async def test_an_error_while_deciding_stops_motion_too(script, journal, bench) -> None:
-    script.next_step = Mock(side_effect=LimitError("the gauges cannot be zeroed"))
-    with pytest.raises(LimitError):
+    script.next_step = Mock(side_effect=errors.LimitError("the gauges cannot be zeroed"))
+    with pytest.raises(errors.LimitError):
         await Engine(script, journal).run()
     assert bench.controller.log == ["prepare", "stop"]
     assert [event.kind for event in journal.events] == ["interrupted"]
 
 
 async def test_a_controller_that_cannot_be_prepared_ends_the_run_at_once(script, journal, bench) -> None:
-    bench.controller.failures["prepare"] = DeviceError("is in emergency stop", subject="controller")
-    with pytest.raises(DeviceError, match="emergency"):
+    bench.controller.failures["prepare"] = errors.DeviceError("is in emergency stop", subject="controller")
+    with pytest.raises(errors.DeviceError, match="emergency"):
         await Engine(script, journal).run()
     assert script.done == []
     assert bench.controller.log == ["prepare", "stop"]
@@ -162,22 +156,22 @@ async def test_a_controller_that_cannot_be_prepared_ends_the_run_at_once(script,
 
 
 @pytest.mark.parametrize(
-    "error", [DeviceError("does not answer", subject="gauge x"), Interruption("aborted")]
+    "error", [errors.DeviceError("does not answer", subject="gauge x"), errors.Interruption("aborted")]
 )
 async def test_if_stopping_fails_too_that_is_said_first(script, journal, bench, error) -> None:
     script.failure = error
-    bench.controller.failures["stop"] = DeviceError("connection lost", subject="controller")
+    bench.controller.failures["stop"] = errors.DeviceError("connection lost", subject="controller")
     with pytest.raises(RobotNotStopped) as failure:
         await Engine(script, journal).run()
     first, then = str(failure.value).splitlines()
     assert first.startswith("PRESS THE EMERGENCY STOP. The robot could not be stopped and may still move: ")
     assert first.endswith("controller: connection lost")
     assert then == str(error)
-    assert failure.value.exit_code is ExitCode.HARDWARE
+    assert failure.value.exit_code is errors.ExitCode.HARDWARE
     assert journal.events[-1] == events.Interrupted(reason=str(failure.value), exit_code=3)
 
 
-@pytest.mark.parametrize("error", [BrokenPipeError(), FileError("the disk is full")])
+@pytest.mark.parametrize("error", [BrokenPipeError(), errors.FileError("the disk is full")])
 async def test_an_event_that_is_not_kept_or_not_heard_stops_motion(script, journal, bench, error) -> None:
     def listener(event: events.Event, _: RunState) -> None:
         if isinstance(event, events.Arrived):
@@ -263,5 +257,5 @@ async def test_a_commit_that_cannot_be_journalled_is_reverted_or_reported(
     assert rig.controller.log.count("reload") == 2, "the geometry that it read is taken from it"
     if not reload_works:
         assert "the controller has the new geometry, which could be neither noted nor taken" in report
-    assert (await rig.run()).exit_code == ExitCode.DONE
+    assert (await rig.run()).exit_code == errors.ExitCode.DONE
     assert rig.config == recording.config_after

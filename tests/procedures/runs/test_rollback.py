@@ -13,16 +13,7 @@ from hexacell.verdict.decision import Verdict
 from procedures.engine.commands import UnattendedOperator
 from procedures.run.state import fold
 from procedures.steps import events
-from tests.procedures.runs.listening import (
-    PowerCut,
-    at_step,
-    commanding,
-    cut_power,
-    happened,
-    on,
-    somebody_edits,
-    with_tiny_deviations_before,
-)
+from tests.procedures.runs import listening
 
 CLEARLY_WORSE: dict[str, Any] = {"simulation__gauges__noise_mm": 0.01}
 """Deviations that are significant whatever noise is drawn."""
@@ -36,16 +27,16 @@ def recorded(run: Any) -> tuple[WriteRecord, ...]:
 
 
 async def test_a_result_worse_than_before_is_rolled_back_bit_for_bit(recording, replayed) -> None:
-    rig = replayed(with_tiny_deviations_before(recording.until(events.Proposed)), **CLEARLY_WORSE)
+    rig = replayed(listening.with_tiny_deviations_before(recording.until(events.Proposed)), **CLEARLY_WORSE)
     ended = await rig.run()
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
     assert ended.line.endswith("(worse than before); rolled back, the controller has its old config")
-    assert happened(rig, events.ResultValidated)[0].verdict is Verdict.FAIL
-    assert happened(rig, events.Committed)
+    assert listening.happened(rig, events.ResultValidated)[0].verdict is Verdict.FAIL
+    assert listening.happened(rig, events.Committed)
     assert ended.displacement is None, "nothing need be taught anew"
     assert rig.config == recording.config_before
     assert rig.controller.log.count("reload") == 2
-    assert commanding(rig).largest_difference(rig.calibration.robot.controller) == 0.0
+    assert listening.commanding(rig).largest_difference(rig.calibration.robot.controller) == 0.0
     written, back = recorded(rig)
     assert (back.kind, back.by, back.run) == (WriteKind.TAKEN_BACK, THE_RUN, "run")
     assert back.why.endswith("(worse than before)")
@@ -61,8 +52,8 @@ async def test_a_better_result_out_of_limits_is_rolled_back_if_nobody_keeps_it(r
     ended = await rig.run()
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
     assert ended.line.endswith("rolled back, the controller has its old config, the worse one")
-    assert happened(rig, events.ResultValidated)[0].verdict is Verdict.FAIL
-    assert happened(rig, events.ResultAccepted) == [events.ResultAccepted(by=None)]
+    assert listening.happened(rig, events.ResultValidated)[0].verdict is Verdict.FAIL
+    assert listening.happened(rig, events.ResultAccepted) == [events.ResultAccepted(by=None)]
     assert rig.config == recording.config_before
 
 
@@ -70,8 +61,8 @@ async def test_a_result_that_a_person_keeps_stays_although_the_run_is_killed_bef
     recording, replayed
 ) -> None:
     rig = replayed(recording.until(events.Proposed), acceptance__position_mm=0.0001)
-    with pytest.raises(PowerCut):
-        await rig.run(on(events.ResultValidated, cut_power))
+    with pytest.raises(listening.PowerCut):
+        await rig.run(listening.on(events.ResultValidated, listening.cut_power))
     assert rig.config == recording.config_after
     ended = await rig.run()
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
@@ -90,7 +81,7 @@ async def test_a_conditional_verdict_needs_a_person(recording, replayed, attende
     if not attended:
         object.__setattr__(rig.performer, "operator", UnattendedOperator())
     ended = await rig.run()
-    assert happened(rig, events.ResultValidated)[0].verdict.is_conditional
+    assert listening.happened(rig, events.ResultValidated)[0].verdict.is_conditional
     assert ended.exit_code == (ExitCode.DONE if attended else ExitCode.ANSWER_NEEDED)
     assert rig.config == (recording.config_after if attended else recording.config_before)
     assert rig.folder.proposal.exists()
@@ -112,10 +103,12 @@ async def test_a_ball_outside_the_travel_at_verification_rolls_back_unless_by_ch
     monkeypatch.setattr(Allowances, "scatters", property(lambda _: scatters))
     rig = replayed(recording.until(events.Proposed))
     failures = iter(times * [GaugeAtEnd("is at an end of its travel", subject="gauge x")])
-    fault = at_step("after-V2/o03/sample", lambda: rig.gauges[0].failures.extend(islice(failures, 1)))
+    fault = listening.at_step(
+        "after-V2/o03/sample", lambda: rig.gauges[0].failures.extend(islice(failures, 1))
+    )
     assert (await rig.run(fault)).exit_code == (ExitCode.DONE if stays else ExitCode.OUT_OF_LIMITS)
-    assert (happened(rig, events.ResultValidated)[0].verdict is not Verdict.FAIL) == stays
-    assert (not happened(rig, events.RolledBack)) == stays
+    assert (listening.happened(rig, events.ResultValidated)[0].verdict is not Verdict.FAIL) == stays
+    assert (not listening.happened(rig, events.RolledBack)) == stays
     assert rig.config == (recording.config_after if stays else recording.config_before)
 
 
@@ -128,21 +121,21 @@ async def test_a_reading_that_could_not_be_taken_once_is_taken_again(recording, 
         rig.gauges[0].failures.extend(at_ends)
         at_ends.clear()
 
-    assert (await rig.run(at_step("after-V1/o02/sample", once))).exit_code == ExitCode.DONE
-    (refused,) = happened(rig, events.RecordRejected)
+    assert (await rig.run(listening.at_step("after-V1/o02/sample", once))).exit_code == ExitCode.DONE
+    (refused,) = listening.happened(rig, events.RecordRejected)
     assert (str(refused.at), refused.orientation) == ("after-V1", 2)
-    assert [event.at for event in happened(rig, events.ReferenceConfirmed)] == [refused.at]
-    assert happened(rig, events.ResultValidated)[0].verdict is Verdict.PASS
+    assert [event.at for event in listening.happened(rig, events.ReferenceConfirmed)] == [refused.at]
+    assert listening.happened(rig, events.ResultValidated)[0].verdict is Verdict.PASS
     assert rig.config == recording.config_after
 
 
 async def test_gauges_that_cannot_be_zeroed_are_no_verdict_on_the_new_geometry(recording, replayed) -> None:
     rig = replayed(recording.until(events.Proposed))
     at_end = GaugeAtEnd("is at an end of its travel", subject="gauge x")
-    fault = at_step("after-V1/o01/sample", lambda: rig.gauges[0].failures.append(at_end))
+    fault = listening.at_step("after-V1/o01/sample", lambda: rig.gauges[0].failures.append(at_end))
     with pytest.raises(WriteBackUndone, match="cannot be zeroed"):
         await rig.run(fault)
-    assert not happened(rig, events.ResultValidated)
+    assert not listening.happened(rig, events.ResultValidated)
     assert rig.config == recording.config_before, "nothing unverified stays"
     assert (await rig.run()).exit_code == ExitCode.DONE
     assert rig.config == recording.config_after
@@ -156,8 +149,8 @@ async def test_a_failed_reload_restores_the_config(recording, replayed) -> None:
     assert undone.value.exit_code is ExitCode.WRITE_BACK_UNDONE
     assert rig.config == recording.config_before
     assert rig.controller.log.count("reload") == 2, "the old config must be loaded again"
-    assert not happened(rig, events.Committed)
-    assert happened(rig, events.Interrupted)[-1].exit_code == ExitCode.WRITE_BACK_UNDONE
+    assert not listening.happened(rig, events.Committed)
+    assert listening.happened(rig, events.Interrupted)[-1].exit_code == ExitCode.WRITE_BACK_UNDONE
     assert [one.kind for one in recorded(rig)] == [WriteKind.RESULT, WriteKind.TAKEN_BACK]
     assert "did not take it: controller: does not come back" in recorded(rig)[-1].why
     assert (await rig.run()).exit_code == ExitCode.DONE, "resumed, it is written"
@@ -178,7 +171,7 @@ async def test_a_controller_that_cannot_reload_the_old_config_is_reported(record
 
 async def test_a_config_edited_during_the_run_is_not_overwritten(recording, replayed) -> None:
     rig = replayed(recording.until(events.Proposed))
-    edited = somebody_edits(rig)
+    edited = listening.somebody_edits(rig)
     rig.controller.log.clear()
     with pytest.raises(FileError, match="changed since the run began") as refusal:
         # The run's own beginning stands in the journal: the config that it knows.
@@ -189,25 +182,25 @@ async def test_a_config_edited_during_the_run_is_not_overwritten(recording, repl
 
 
 async def test_a_rollback_does_not_overwrite_an_edited_config(recording, replayed) -> None:
-    rig = replayed(with_tiny_deviations_before(recording.until(events.Proposed)), **CLEARLY_WORSE)
+    rig = replayed(listening.with_tiny_deviations_before(recording.until(events.Proposed)), **CLEARLY_WORSE)
     edited: list[bytes] = []
-    edit = on(events.ResultValidated, lambda: edited.append(somebody_edits(rig)))
+    edit = listening.on(events.ResultValidated, lambda: edited.append(listening.somebody_edits(rig)))
     with pytest.raises(FileError, match="changed since it was written"):
         await rig.run(edit)
     assert [rig.config] == edited
 
 
 async def test_an_interrupted_rollback_is_finished_on_resuming(recording, replayed) -> None:
-    rig = replayed(with_tiny_deviations_before(recording.until(events.Proposed)), **CLEARLY_WORSE)
+    rig = replayed(listening.with_tiny_deviations_before(recording.until(events.Proposed)), **CLEARLY_WORSE)
     broken = DeviceError("does not come back", subject="controller")
-    fault = on(events.ResultValidated, lambda: rig.controller.failures.update(reload=broken))
+    fault = listening.on(events.ResultValidated, lambda: rig.controller.failures.update(reload=broken))
     with pytest.raises(DeviceError, match="does not come back"):
         await rig.run(fault)
     assert rig.config == recording.config_before
     ended = await rig.run()
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
-    assert happened(rig, events.RolledBack)
-    assert commanding(rig).largest_difference(rig.calibration.robot.controller) == 0.0
+    assert listening.happened(rig, events.RolledBack)
+    assert listening.commanding(rig).largest_difference(rig.calibration.robot.controller) == 0.0
 
 
 def test_a_result_is_recorded(recording) -> None:

@@ -4,17 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.controllers.linuxcnc.protocol import (
-    LineBuffer,
-    Response,
-    encode_command,
-    parse_explanation,
-    parse_positions,
-    parse_response,
-    pose_difference,
-    restoring_block,
-    timed_move,
-)
+from drivers.controllers.linuxcnc import protocol
 from hexacell.errors import UsageError
 from hexacell.kinematics.pose import Pose
 
@@ -27,7 +17,7 @@ COORDINATES = st.floats(-1e6, 1e6)
 def test_lines_are_split_at_any_line_end_and_any_packet_boundary(lines, data):
     stream = b"".join(line.encode() + end for line, end in lines)
     cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)))))
-    buffer = LineBuffer()
+    buffer = protocol.LineBuffer()
     found = []
     for start, end in zip([0, *cuts], [*cuts, len(stream)], strict=True):
         found += buffer.feed(stream[start:end])
@@ -38,7 +28,7 @@ def test_lines_are_split_at_any_line_end_and_any_packet_boundary(lines, data):
 @given(st.text())
 def test_an_encoded_command_fits_the_server_and_is_one_line(command):
     try:
-        line = encode_command(command, "controller")
+        line = protocol.encode_command(command, "controller")
     except UsageError:
         assert len(command.encode()) > 253 or "\r" in command or "\n" in command
     else:
@@ -49,12 +39,12 @@ def test_an_encoded_command_fits_the_server_and_is_one_line(command):
 
 @given(st.builds(Pose, *[COORDINATES] * 6), st.floats(0.1, 1e5))
 def test_a_timed_move_keeps_pose_and_duration_and_fits_a_line(pose, duration_s):
-    words = timed_move(pose, duration_s).split()
+    words = protocol.timed_move(pose, duration_s).split()
     letters, values = zip(*((word[0], float(word[1:])) for word in words), strict=True)
     assert "".join(letters) == "GGGGXYZABCF"
     assert values[4:10] == pytest.approx(pose.as_tuple(), abs=1e-7)
     assert 60.0 / values[10] == pytest.approx(duration_s, rel=1e-4)
-    encode_command(f"set mdi {timed_move(pose, duration_s)}", "controller")
+    protocol.encode_command(f"set mdi {protocol.timed_move(pose, duration_s)}", "controller")
 
 
 @pytest.mark.parametrize(
@@ -71,58 +61,59 @@ def test_a_timed_move_keeps_pose_and_duration_and_fits_a_line(pose, duration_s):
     ],
 )
 def test_the_modes_of_before_are_restored_by_one_block(codes, block):
-    assert restoring_block(codes) == block
+    assert protocol.restoring_block(codes) == block
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf")])
 def test_a_timed_move_to_a_pose_that_is_not_finite_is_refused(value):
     with pytest.raises(ValueError, match="not a finite number"):
-        timed_move(Pose(0.0, 0.0, 500.0, 0.0, value, 0.0), 1.0)
+        protocol.timed_move(Pose(0.0, 0.0, 500.0, 0.0, value, 0.0), 1.0)
 
 
 @pytest.mark.parametrize(
     ("line", "command", "answer"),
     [
-        ("SET MDI ACK", "set mdi G0 X1", Response(accepted=True)),
-        ("SET MDI NAK", "set mdi G0 X1", Response(accepted=False)),
-        ("SET NAK", "set mdi G0 X1", Response(accepted=False)),
-        ("SET WAIT_MODE ACK", "set set_wait done", Response(accepted=True)),
+        ("SET MDI ACK", "set mdi G0 X1", protocol.Response(accepted=True)),
+        ("SET MDI NAK", "set mdi G0 X1", protocol.Response(accepted=False)),
+        ("SET NAK", "set mdi G0 X1", protocol.Response(accepted=False)),
+        ("SET WAIT_MODE ACK", "set set_wait done", protocol.Response(accepted=True)),
         ("SET MODE ACK", "set mdi G0 X1", None),
         ("set mdi G0 X1", "set mdi G0 X1", None),
         ("MDI ACK", "set mdi G0 X1", None),
         ("GET MDI NAK", "set mdi G0 X1", None),
-        ("ESTOP ON", "get estop", Response(accepted=True, text="ON")),
-        ("ERROR OK", "get error", Response(accepted=True, text="OK")),
-        ("ERROR", "get error", Response(accepted=True, text="")),
-        ("ERROR a  b NAK", "get error", Response(accepted=True, text="a  b NAK")),
+        ("ESTOP ON", "get estop", protocol.Response(accepted=True, text="ON")),
+        ("ERROR OK", "get error", protocol.Response(accepted=True, text="OK")),
+        ("ERROR", "get error", protocol.Response(accepted=True, text="")),
+        ("ERROR a  b NAK", "get error", protocol.Response(accepted=True, text="a  b NAK")),
         ("error: no", "get error", None),
-        ("GET FOO NAK", "get foo", Response(accepted=False)),
-        ("GET NAK", "get foo", Response(accepted=False)),
+        ("GET FOO NAK", "get foo", protocol.Response(accepted=False)),
+        ("GET NAK", "get foo", protocol.Response(accepted=False)),
         ("JOINT_POS 1 2 3 4 5 6", "get abs_act_pos", None),
         ("get estop", "get estop", None),
         ("SET ESTOP ACK", "get estop", None),
     ],
 )
 def test_an_answer_is_matched_to_its_command(line, command, answer):
-    assert parse_response(line, command) == answer
+    assert protocol.parse_response(line, command) == answer
 
 
 def test_explanations_are_distinguished_from_answers():
     assert (
-        parse_explanation("error: Machine must be 'ON' for SET MDI") == "Machine must be 'ON' for SET MDI"
+        protocol.parse_explanation("error: Machine must be 'ON' for SET MDI")
+        == "Machine must be 'ON' for SET MDI"
     )
-    assert parse_explanation("ERROR OK") == ""
-    assert parse_explanation("warning: newer") == ""
+    assert protocol.parse_explanation("ERROR OK") == ""
+    assert protocol.parse_explanation("warning: newer") == ""
 
 
 def test_positions_beyond_the_sixth_belong_to_other_axes():
-    assert parse_positions("1 -2 3.5 4 5 6 7 8") == (1.0, -2.0, 3.5, 4.0, 5.0, 6.0)
+    assert protocol.parse_positions("1 -2 3.5 4 5 6 7 8") == (1.0, -2.0, 3.5, 4.0, 5.0, 6.0)
 
 
 @given(st.text() | st.lists(st.floats().map(str)).map(" ".join))
 def test_positions_are_six_finite_numbers_or_refused(text):
     try:
-        positions = parse_positions(text)
+        positions = protocol.parse_positions(text)
     except ValueError:
         return
     assert len(positions) == 6
@@ -131,4 +122,4 @@ def test_positions_are_six_finite_numbers_or_refused(text):
 
 def test_the_pose_difference_ignores_full_turns_and_gives_the_largest_components():
     one, other = Pose(1, 2, 3, 180.0, 0.1, 0), Pose(1, 2.5, 2, -180.0, -0.2, 0)
-    assert pose_difference(one, other) == pytest.approx((1.0, 0.3))
+    assert protocol.pose_difference(one, other) == pytest.approx((1.0, 0.3))

@@ -65,7 +65,7 @@ def read_signals(settings: DbcSettings, unit: JointUnit, step: float) -> tuple[P
     Raises ``FileError`` if the file cannot be read, or lacks a message, signal, unit or range; a
     ``UsageError`` without cantools.
     """
-    cantools = optional("cantools", "dbc", "encoders")
+    cantools = _cantools()
     require_size(Path(settings.file))
     try:
         with Path(settings.file).open("rb") as file:
@@ -75,6 +75,10 @@ def read_signals(settings: DbcSettings, unit: JointUnit, step: float) -> tuple[P
         raise FileError(f"cannot be read: {error}", subject=settings.file, action="Correct it") from error
     named = enumerate(settings.signals, 1)
     return tuple(_signal(found, settings, leg, name, unit, step) for leg, name in named)
+
+
+def _cantools() -> Any:  # noqa: ANN401 - of a library that may be missing
+    return optional("cantools", "dbc", "encoders")
 
 
 def _signal(
@@ -90,7 +94,7 @@ def _signal(
     signal = _named(message.signals, signal_name, "signal", settings)
     try:
         message.refresh(strict=True)
-    except optional("cantools", "dbc", "encoders").Error as error:
+    except _cantools().Error as error:
         raise FileError(
             f"contradicts itself: {str(error).rstrip('.')}",
             subject=settings.file,
@@ -199,7 +203,7 @@ class DbcSession(BankSession):
             return _Received(now, 0.0, problem)
         try:
             values = signal.message.decode(data, decode_choices=False)
-        except optional("cantools", "dbc", "encoders").Error as error:
+        except _cantools().Error as error:
             return _Received(now, 0.0, f"sends what the DBC file does not describe ({error})")
         if (value := values.get(signal.signal.name)) is None:
             return None

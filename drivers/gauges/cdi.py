@@ -90,7 +90,7 @@ class CdiGauge(SerialGauge):
             return None
         for _ in range(2):  # the answer to one may have been lost
             try:
-                value = await self._query(
+                value = await self._optional(
                     b"?p%03d\r" % parameter, partial(parse_parameter, parameter=parameter)
                 )
             except GaugeSilent:

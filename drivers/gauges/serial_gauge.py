@@ -223,6 +223,14 @@ class SerialGauge(ABC):
                 self._require_silence()
         raise self._rejected(rejected)
 
+    async def _optional(self, request: bytes, parse: Callable[[bytes], Parsed | None]) -> Parsed | None:
+        """A setting; None if the instrument says twice that it has none, as it does of a damaged request.
+
+        Once it is open, a setting that is gone is a change, for which all of them are asked again.
+        """
+        setting = await self._query(request, parse)
+        return await self._query(request, parse) if setting is None and self._state is None else setting
+
     async def _ask(self, request: bytes) -> bytes:
         port = self._open_port()
         try:

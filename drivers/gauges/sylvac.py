@@ -96,7 +96,7 @@ class SylvacGauge(SerialGauge):
         )
 
     async def _setting(self, query: Query) -> str | None:
-        return await self._query(query.command, query.parse)
+        return await self._optional(query.command, query.parse)
 
     async def _ask(self, request: bytes) -> bytes:
         before, self._previous = self._previous, (request, b"")

@@ -75,6 +75,13 @@ async def test_one_lost_answer_does_not_mean_that_there_are_no_parameters(dialog
         await gauge.open()
 
 
+async def test_a_parameter_is_absent_only_if_that_is_said_twice(dialogue, gauge):
+    asked = opening(p021=b"1\r\n")
+    dialogue.expect(*asked[:3], (b"?p021\r", b"NOT FOUND\r\n"), *asked[3:], *2 * asked)
+    with pytest.raises(WrongSetting, match="hold"):
+        await gauge.open()
+
+
 async def test_an_answer_of_which_only_the_line_end_came_is_damage_and_no_silence(dialogue, opened):
     asked = opening()
     dialogue.expect(asked[0], (b"?p011\r", b"\r\n"), *asked[1:])

@@ -32,7 +32,11 @@ class OutputKind:
     may_be_in_run: bool = False
 
 
-EVENTS = OutputKind("events of a run", re.compile(rb'\A\{"n":1,"version":\d+,"at":"'), mode=0o600)
+EVENTS_MARK = b" "
+"""Before what is a copy of a journal, line by line; it tells the two apart, and JSON may begin so."""
+EVENTS = OutputKind(
+    "events of a run", re.compile(rb"\A" + EVENTS_MARK + rb'\{"n":1,"version":\d+,"at":"'), mode=0o600
+)
 LOG = OutputKind("a log of hexacell", re.compile(rb"\A\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z [A-Z]+ [a-z]"))
 METRICS = OutputKind("metrics of cells", re.compile(rb"\A# HELP hexacell_"))
 REPORT = OutputKind(

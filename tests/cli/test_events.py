@@ -13,10 +13,10 @@ SHORT = ("budget_records = 40", "budget_records = 4")
 
 def test_each_event_is_a_line_as_in_the_journal(typed_here, quick_cell, few_candidates, tmp_path) -> None:
     target = tmp_path / "events.jsonl"
-    target.write_text('{"n":1,"version":1,"at":"of yesterday"}\n')
+    target.write_text(' {"n":1,"version":1,"at":"of yesterday"}\n')
     quick_cell.edit(SHORT)
     typed_here("run", quick_cell.cell, *CHECK, "--events", target)
-    written = b"".join((run / "journal.jsonl").read_bytes() for run in quick_cell.runs())
+    written = b"".join(b" " + (run / "journal.jsonl").read_bytes() for run in quick_cell.runs())
     assert target.read_bytes() == written
     assert len(written.splitlines()) > 50
 

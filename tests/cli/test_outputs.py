@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -67,11 +68,12 @@ def test_no_output_replaces_a_cell_a_config_a_journal_or_a_note(
     note.write_text("precious")
     link.symlink_to(cell_folder.controller)
     nothing.symlink_to(tmp_path / "absent")
+    copied = Path(shutil.copy(run / "journal.jsonl", tmp_path / "copied.jsonl"))
     places = {"CELL": cell_folder.cell, "RUN": run}
     given = [places.get(one, one) for one in ARGUMENTS[command]]
     before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     theirs = (cell_folder.cell, cell_folder.controller, run / "journal.jsonl", run / "result.json")
-    for target in (*theirs, note, link, nothing):
+    for target in (*theirs, copied, note, link, nothing):
         outcome = typed_here(command, *given, option, target)
         assert (outcome.code, target.name in outcome.err) == (2, True), (target, outcome.err)
     assert {path: path.read_bytes() for path in before} == before
@@ -79,7 +81,7 @@ def test_no_output_replaces_a_cell_a_config_a_journal_or_a_note(
 
 
 def test_what_an_option_wrote_before_it_writes_again(tmp_path) -> None:
-    event, line = b'{"n":1,"version":1,"at":"2026-', b"2026-11-27T00:00:00.000Z INFO hexacell: x"
+    event, line = b' {"n":1,"version":1,"at":"2026-', b"2026-11-27T00:00:00.000Z INFO hexacell: x"
     for kind, text, lines in ((EVENTS, event, 1), (LOG, line, 2)):
         output = OutputFile(tmp_path / kind.noun, kind)
         for _ in range(2):

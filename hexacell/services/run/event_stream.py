@@ -11,7 +11,7 @@ from pathlib import Path
 
 from hexacell.errors import UsageError
 from hexacell.storage.atomic_files import os_error_to_file_error
-from hexacell.storage.output_files import OutputFile
+from hexacell.storage.output_files import EVENTS_MARK, OutputFile
 from procedures.engine.engine import Listener
 from procedures.run.state import RunState
 from procedures.steps import events
@@ -58,6 +58,8 @@ class EventStream:
         with path.open("rb") as journal:
             journal.seek(copied)
             while data := journal.read(CHUNK):
+                if not copied:
+                    os.write(self._descriptor, EVENTS_MARK)
                 taken = os.write(self._descriptor, data)
                 copied += taken
                 if taken < len(data):

@@ -27,6 +27,8 @@ JOIN_TIMEOUT_S = 1.0
 ERROR_FRAMES, ERROR_FRAMES_S = 20, 1.0
 """So many error frames within this time are a failure; single ones are repeated by the adapter."""
 
+LINE_STARTS = bytes.maketrans(b"\nzZ", b"\r\r\r")
+"""What adapters with slcan send between frames, as line ends: an empty line is no frame."""
 NUMBERED_AS_LINUX = frozenset({"socketcan", "gs_usb", "virtual"})
 FAULTS = {0x40: "bus off", 0x20: "nobody acknowledges", 0x88: "damaged frames", 0x04: "many errors"}
 """By bits in the identifier of an error frame of these interfaces (linux/can/error.h)."""
@@ -117,7 +119,7 @@ class EncoderBus:
     def _connect(self, settings: Mapping[str, Any]) -> can.BusABC:
         try:
             require_serial_port(str(settings.get("channel", "")))  # of an adapter with slcan
-            return can.Bus(**settings)
+            return _read_as_lines(can.Bus(**settings))
         except Exception as error:  # the interfaces of python-can raise errors of any class
             action = "Plug the CAN adapter in, or correct `bus` under [encoders] in the cell file"
             action = _advice(error) or action
@@ -128,8 +130,8 @@ class EncoderBus:
             while not self._closing.is_set():
                 try:
                     message = self._bus.recv(SLICE_S)
-                except (ValueError, can.CanError) as error:  # of python-can's slcan: damage on USB
-                    if not isinstance(error.__cause__ or error, ValueError):
+                except (ValueError, IndexError, can.CanError) as error:  # of slcan: damage on USB
+                    if not isinstance(error.__cause__ or error, ValueError | IndexError):
                         raise
                     getattr(self._bus, "flush", bool)()  # it would decode the same bytes again
                     self._count_fault(f"{NO_FRAME} ({error})")
@@ -200,6 +202,15 @@ class _Network(canopen.Network):
 def is_canopen(message: can.Message) -> bool:
     """Whether it is a data frame with an 11-bit id, sent by another participant."""
     return message.is_rx and not (message.is_remote_frame or message.is_extended_id)
+
+
+def _read_as_lines(bus: can.BusABC) -> can.BusABC:
+    """The bus; python-can's slcan drops lines that begin with a line feed, or with a late z or Z."""
+    port = getattr(bus, "serialPortOrig", None)
+    if port is not None:
+        read = port.read
+        port.read = lambda size=1: read(size).translate(LINE_STARTS)
+    return bus
 
 
 def _advice(error: Exception) -> str | None:

@@ -74,6 +74,7 @@ DAMAGED.__cause__ = ValueError()
         (can.Message(is_error_frame=True, arbitration_id=0x20), "nobody acknowledges.*bit rate"),
         (can.Message(is_error_frame=True, arbitration_id=0x40), "gave up .*bus off"),
         (ValueError("non-hexadecimal number found"), "no frame .*End other programs that read this port"),
+        (IndexError("of a line that was cut"), "no frame .*End other programs that read this port"),
         (DAMAGED, "no frame .*can't decode.*End other programs that read this port"),
         (can.CanOperationError("Network is down"), "Switch the CAN interface on"),
     ],

@@ -1,8 +1,10 @@
 """Discovery on a CAN bus: frames of strangers are told, and the node id of the only device is set."""
 
+import threading
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from functools import partial
+from typing import Any
 
 import can
 import pytest
@@ -17,6 +19,7 @@ from drivers.discovery.encoders import (
     frames_of_no_node,
     search_bus,
 )
+from drivers.encoders.can_bus import EncoderBus
 from drivers.errors import BusError
 from drivers.simulated import slcan
 from drivers.simulated.encoders.can_bus import PeriodicAction, SimulatedCanBus
@@ -118,6 +121,7 @@ ADAPTERS = (
     b"0c1d2e3f4-dirty git@x.org:y",
     b"CANtact 1",
     b"\aV0100",
+    b"V1013\r\n",
 )
 
 
@@ -135,6 +139,17 @@ def test_frames_of_all_nodes_are_told_only_where_there_are_none(number: int) -> 
     one = FoundFrame(number, False, 0, 1.0, changes=False)
     assert frames_of_no_node([one], []) == (one,)
     assert frames_of_no_node([one], [5]) == ()
+
+
+@pytest.mark.parametrize("line", [b"%s\r\n", b"\n%s\n", b"z%s\r", b"Z\r\n\a%s\r"])
+def test_frames_are_seen_with_any_line_end_and_after_a_late_acknowledgement(line: bytes) -> None:
+    adapter = {"interface": "slcan", "channel": "loop://", "sleep_after_open": 0}
+    with closing(EncoderBus(adapter, threading.Event())) as bus:
+        received: list[bytes] = []
+        bus.network.subscribe(0x181, lambda _number, data, _time: received.append(bytes(data)))
+        port: Any = bus._bus
+        port.serialPortOrig.write(line % b"t18121234" * 2)
+        assert bus.wait_for(lambda: received == [b"\x12\x34"] * 2, 5.0)
 
 
 set_node_id = partial(encoders.set_node_id, timeouts=SearchTimeouts(adapter=0.3, node=0.1))

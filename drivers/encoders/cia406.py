@@ -64,13 +64,11 @@ class EncoderSession(BankSession):
         node_identity.detect_nodes(nodes, self.bus, settings.timeout_s)
         monitors = tuple(NodeMonitor(leg, self.bus, settings.heartbeat_ms) for leg in legs)
         device_types = tuple(node_identity.read_device_type(node, settings.unit) for node in nodes)
-        self.identities = tuple(map(self._identify, nodes, device_types))
+        self.identities = tuple(map(self._identify, nodes, device_types, monitors))
         channels = tuple(
-            configure_position_tpdo(node, device_type, settings.heartbeat_ms)
+            configure_position_tpdo(node, device_type)
             for node, device_type in zip(nodes, device_types, strict=True)
         )
-        for monitor in monitors:
-            monitor.start_heartbeat_timeout()
         sampler = SyncSampler(legs, channels, self.bus, settings.timeout_s, signed=settings.signed)
 
         def check_all() -> None:
@@ -87,14 +85,14 @@ class EncoderSession(BankSession):
         sampler.sample()
         self.bus.listen(node_identity.SECOND_RESPONSE_S)  # to surplus responses
 
-    def _identify(self, node: EncoderNode, device_type: DeviceType) -> DeviceIdentity:
+    def _identify(self, node: EncoderNode, device_type: DeviceType, monitor: NodeMonitor) -> DeviceIdentity:
         node_identity.check_step(node, self._settings)
         identity = node_identity.read_identity(node, device_type)
         node_identity.check_serial_number(node, identity, self._settings)
-        if self._data_sheet is not None and (differing := self._data_sheet.check(node)):
-            identity = replace(identity, remark="; ".join(filter(None, (identity.remark, differing))))
+        differing = "" if self._data_sheet is None else self._data_sheet.check(node)
         follow_plain_sync(node)
-        return identity
+        remarks = (identity.remark, differing, monitor.start_heartbeat(node))
+        return replace(identity, remark="; ".join(filter(None, remarks)))
 
 
 class Cia406Bank(ThreadedBank[EncoderSession]):

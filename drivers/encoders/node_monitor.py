@@ -9,7 +9,7 @@ from canopen.emcy import EmcyError
 
 from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode, Leg, subject_of
-from drivers.encoders.object_dictionary import ALARMS, ERROR_REGISTER, WARNINGS
+from drivers.encoders.object_dictionary import ALARMS, ERROR_REGISTER, PRODUCER_HEARTBEAT, WARNINGS
 from drivers.errors import RestartedNodeError, invalid_sample, silent_encoder
 
 HEARTBEAT = 0x700
@@ -66,10 +66,21 @@ class NodeMonitor:
         """Whether its heartbeat is overdue."""
         return self._last_heartbeat is not None and now_s - self._last_heartbeat > self.timeout_s
 
-    def start_heartbeat_timeout(self) -> None:
-        """From now on a missing heartbeat is a fault, unless heartbeats are off."""
-        if self._heartbeat_ms:
+    def start_heartbeat(self, node: EncoderNode) -> str:
+        """Set its heartbeat, or switch it off; a missing one is a fault from now on.
+
+        Gives what a person should know: some nodes send none, only answer to guarding (CiA 301, 100Ch), or
+        do not keep the setting. Their silence is a missing response to SYNC.
+        """
+        setting = node.read_optional(PRODUCER_HEARTBEAT)
+        if setting or (setting is not None and self._heartbeat_ms):
+            node.write(PRODUCER_HEARTBEAT, self._heartbeat_ms)
+            setting = node.read(PRODUCER_HEARTBEAT)
+        if self._heartbeat_ms and setting:
             self._last_heartbeat = time.monotonic()
+        elif self._heartbeat_ms:
+            return f"it does not send a heartbeat ({PRODUCER_HEARTBEAT}): its silence is seen at a sample"
+        return ""
 
     def _on_heartbeat(self, _can_id: int, data: bytearray, _timestamp: float) -> None:
         if self._last_heartbeat is not None:

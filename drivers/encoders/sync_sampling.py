@@ -1,7 +1,7 @@
 """Sampling: one SYNC, and one position of each leg, all of the same instant.
 
-A node is configured for that in PRE-OPERATIONAL: one TPDO with its position at every SYNC, no other TPDO,
-and a heartbeat. Nothing is stored in the device: a power cycle restores its settings. Positions are never
+A node is configured for that in PRE-OPERATIONAL: one TPDO with its position at every SYNC, no other TPDO.
+Nothing is stored in the device: a power cycle restores its settings. Positions are never
 read over SDO: some devices respond with an older sample.
 """
 
@@ -69,8 +69,8 @@ class PositionChannel:
         return int.from_bytes(data[self.first : self.length], "little", signed=signed)
 
 
-def configure_position_tpdo(node: EncoderNode, kind: DeviceType, heartbeat_ms: int) -> PositionChannel:
-    """Set one TPDO to the position with every SYNC, switch the others off, start the heartbeat."""
+def configure_position_tpdo(node: EncoderNode, kind: DeviceType) -> PositionChannel:
+    """Set one TPDO to the position with every SYNC, and switch the others off."""
     tpdos = [tpdo for number in range(1, od.TPDO_COUNT + 1) if (tpdo := _read(node, number)) is not None]
     if not tpdos:
         raise setting_refused("has no transmit PDO", node.leg)
@@ -80,17 +80,7 @@ def configure_position_tpdo(node: EncoderNode, kind: DeviceType, heartbeat_ms: i
     )
     for tpdo in tpdos:
         node.write(od.tpdo_parameter(tpdo.number, od.COB_ID), tpdo.cob_id | _OFF)
-    channel = _set_up(node, selected, kind)
-    heartbeat = node.read_optional(od.PRODUCER_HEARTBEAT)
-    if heartbeat is None and heartbeat_ms:
-        raise DeviceError(
-            f"has no heartbeat ({od.PRODUCER_HEARTBEAT})",
-            subject=node.leg.subject,
-            action="Write `heartbeat_ms = 0` under [encoders]; its silence is then seen at the next sample",
-        )
-    if heartbeat_ms or heartbeat:
-        node.write(od.PRODUCER_HEARTBEAT, heartbeat_ms)
-    return channel
+    return _set_up(node, selected, kind)
 
 
 def follow_plain_sync(node: EncoderNode) -> None:

@@ -24,6 +24,9 @@ DIALOGUE_WITH_NODE_4 = """
     4005650000000000    warnings (not there)
     4005100000000000    SYNC of another identifier (not there)
     4019100000000000    SYNC with a counter (not there)
+    4017100000000000    heartbeat
+    2b171000fa000000              every 250 ms
+    4017100000000000              kept?
     4000180100000000    TPDO1: COB-ID
     40001a0000000000           mapped entries: none
     4000180200000000           transmission type
@@ -40,8 +43,6 @@ DIALOGUE_WITH_NODE_4 = """
     2301180184020000          on
     4001180200000000          kept?
     4001180100000000          on?
-    4017100000000000    heartbeat
-    2b171000fa000000              every 250 ms
     4001100000000000    error register (not there)
     4003650000000000    alarms (not there)
     4005650000000000    warnings (not there)

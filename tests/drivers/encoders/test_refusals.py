@@ -72,13 +72,6 @@ async def test_a_setting_that_is_refused_for_the_moment_is_written_again(raw, ba
     assert len(asked) == 2
 
 
-async def test_a_device_without_a_heartbeat_is_used_where_the_cell_file_says_so(raw, make_bank):
-    del raw.nodes[2].objects[HEARTBEAT]
-    with pytest.raises(DeviceError, match=r"leg 2 .*has no heartbeat .*1017h.*heartbeat_ms = 0"):
-        await make_bank(heartbeat_ms=250).open()
-    await make_bank(heartbeat_ms=0).open()
-
-
 @pytest.mark.parametrize("setting", [0x90, 0x4000_0080, 0x4000_0090, 0x2000_0080])
 async def test_a_node_that_waits_for_another_sync_is_set_to_this_one(raw, bank, setting):
     raw.nodes[6].objects[SYNC_ID] = setting.to_bytes(4, "little")

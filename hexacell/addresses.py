@@ -2,8 +2,11 @@
 
 import encodings.idna  # noqa: F401 - a process that gave up rights may find it no longer
 import socket
+import sys
+import threading
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache
 from ipaddress import IPv6Address, ip_address
 from urllib.parse import SplitResult, parse_qs, urlsplit
 
@@ -15,6 +18,7 @@ SERIAL_SCHEMES = ("socket", "rfc2217", "loop")
 WITHOUT_HOST = ("loop",)
 METADATA = frozenset(map(ip_address, ("fd00:ec2::254", "fd20:ce::254", "100.100.100.200")))
 """Where clouds tell a computer its secrets, beyond the link-local addresses."""
+LINK_LOCAL = "the address is link-local, or tells the secrets of a cloud"
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +108,28 @@ def is_link_local(host: str, *, by_name: bool) -> bool:
         answers = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM, flags=flags)
         found = [str(answer[4][0]).partition("%")[0] for answer in answers]
     return any(_is_refused(one) for one in found)
+
+
+def connect_to_no_link_local() -> None:
+    """From now on this thread connects to no such address, whatever a name resolved to before."""
+    _watch_connections()
+    _of_thread.is_watched = True
+
+
+_of_thread = threading.local()
+
+
+@cache
+def _watch_connections() -> None:
+    # By a hook, since the libraries that connect resolve names themselves; it cannot be taken away.
+    sys.addaudithook(_require_elsewhere)
+
+
+def _require_elsewhere(event: str, arguments: tuple[object, ...]) -> None:
+    if event == "socket.connect" and getattr(_of_thread, "is_watched", False):
+        match arguments:
+            case (_, (str(host), *_)) if is_link_local(host, by_name=True):
+                raise PermissionError(LINK_LOCAL)
 
 
 def _is_refused(text: str) -> bool:

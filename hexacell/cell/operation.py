@@ -8,7 +8,7 @@ from typing import Literal
 
 from pydantic import field_validator, model_validator
 
-from hexacell.addresses import address_of, is_link_local
+from hexacell.addresses import LINK_LOCAL, address_of, is_link_local
 from hexacell.cell.fields import Host, Name, NotNegative, Positive, Section, Text, broken_rule, key
 from hexacell.errors import UsageError
 from hexacell.storage.toml_document import MASK
@@ -170,7 +170,6 @@ TOLD_BY = {*WITHOUT_TOKENS, *CHAT_SERVERS, *(f"{name}s" for name in CHAT_SERVERS
 """All that notices are sent by: what acts on this computer or has its files read is not among them."""
 
 _SECRET_QUERY = re.compile(r"[?&][^=&]*(?:pass|token|secret|key|auth)[^=&]*=", re.IGNORECASE)
-LINK_LOCAL = "the address is link-local, or tells the secrets of a cloud"
 _WILD = re.compile(r"[#+\0]")
 
 

@@ -22,11 +22,10 @@ from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote, unquote
 
-from hexacell.addresses import address_of, is_link_local
+from hexacell.addresses import LINK_LOCAL, address_of, connect_to_no_link_local, is_link_local
 from hexacell.cell.fields import Password, Section
 from hexacell.cell.operation import (
     BROKERS,
-    LINK_LOCAL,
     WEBHOOKS,
     NotificationSettings,
     Occasion,
@@ -193,10 +192,12 @@ def _attempt(address: NoticeAddress, notice: Notice, longest_s: float) -> None:
 
 
 def _require_elsewhere(address: NoticeAddress) -> None:
-    """Refuse a host that is, or resolves to, a link-local address, unless that is on purpose."""
-    hosts = () if address.link_local else hosts_of(address.url)
-    if any(is_link_local(host, by_name=True) for host in hosts):
+    """Refuse a host that is, resolves to, or leads to a link-local address, unless that is on purpose."""
+    if address.link_local:
+        return
+    if any(is_link_local(host, by_name=True) for host in hosts_of(address.url)):
         raise NoticeUndelivered(LINK_LOCAL)
+    connect_to_no_link_local()  # a name may resolve otherwise by then
 
 
 def post_to_webhook(address: NoticeAddress, notice: Notice, timeout_s: float) -> None:

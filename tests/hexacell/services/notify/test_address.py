@@ -1,15 +1,20 @@
 """Where the secrets of an address come from, and that none is shown."""
 
 import socket
+from ipaddress import ip_address
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from hexacell import addresses
+from hexacell.addresses import address_of
 from hexacell.cell.operation import NotificationSettings
 from hexacell.errors import FileError, UsageError
 from hexacell.services.unattended.delivery import NoticeAddress, deliver, resolved_address, variable
 from hexacell.services.unattended.notice import NoticeUndelivered
+from tests.hexacell.services.notify.local_servers import LOOPBACK, broker, webhook
 from tests.hexacell.services.notify.notices import a_notice, an_address
 
 CHAT = "slack://hidden-a/hidden-b/hidden-c/#general?footer=hidden-d"
@@ -95,3 +100,21 @@ def test_a_name_that_resolves_to_a_link_local_address_gets_nothing(monkeypatch, 
     monkeypatch.setattr(socket.socket, "connect", None)
     with pytest.raises(NoticeUndelivered, match="link-local"):
         deliver(an_address(f"{scheme}://robots.example/x"), a_notice(), pause=lambda _: None)
+
+
+@pytest.mark.parametrize("scheme", ["http", "mqtt", "json"])
+def test_a_name_that_resolves_otherwise_when_it_is_connected_to_gets_nothing(monkeypatch, scheme) -> None:
+    resolve_really, answers = socket.getaddrinfo, cycle(("192.0.2.1", LOOPBACK))
+
+    def resolved(host: str, *rest: Any, **kind: Any) -> Any:
+        return resolve_really(next(answers) if host == "robots.example" else host, *rest, **kind)
+
+    monkeypatch.setattr(socket, "getaddrinfo", resolved)
+    monkeypatch.setattr(addresses, "METADATA", {ip_address(LOOPBACK)})
+    monkeypatch.setenv("no_proxy", "*")
+    with broker() as published, webhook() as posted:
+        port = published.port if scheme == "mqtt" else address_of(posted.url).port
+        url = f"{scheme}://robots.example:{port}/hook"
+        with pytest.raises(NoticeUndelivered, match=None if scheme == "json" else "link-local"):
+            deliver(an_address(url), a_notice(), pause=lambda _: None)
+    assert (posted.bodies, published.published) == ([], [])

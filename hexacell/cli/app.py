@@ -6,13 +6,14 @@ import os
 import shlex
 import sys
 from collections.abc import Sequence
+from contextlib import nullcontext
 from importlib import import_module
 
 from hexacell import __version__
 from hexacell.cli.arguments import make_parser
 from hexacell.cli.arguments.commands import output_of
-from hexacell.cli.console import Console, lost_output
-from hexacell.cli.process import fault_line, log, require_platform, stop_signals_as_sigint
+from hexacell.cli.console import Console, lost_output, unhindered_output
+from hexacell.cli.process import OVER_A_SOCKET, fault_line, log, require_platform, stop_signals_as_sigint
 from hexacell.errors import ExitCode, HexacellError, UsageError
 from hexacell.printable import PrintableFormatter
 from hexacell.storage.output_files import LOG, OutputFile
@@ -45,7 +46,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             for named in vars(options).values():
                 if isinstance(named, OutputFile):  # before anything is done
                     named.require()
-            code = _carried_out(options, typed, console)
+            with nullcontext() if options.target in OVER_A_SOCKET else unhindered_output():
+                code = _carried_out(options, typed, console)
             if code or (lost := lost_output()) is None:
                 return code
             # What nobody can read is not done.

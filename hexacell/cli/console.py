@@ -2,10 +2,15 @@
 
 import json
 import os
+import select
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import asdict, dataclass, is_dataclass
 from datetime import datetime
 from pathlib import Path
+from queue import SimpleQueue
+from threading import Thread
 from typing import Any, TextIO
 
 from hexacell.printable import printable
@@ -60,17 +65,78 @@ def _plain(value: Any) -> Any:  # noqa: ANN401 - what a document has
 def _write(stream: TextIO | None, text: str) -> None:
     if stream is None:  # closed before the program began
         return
-    try:
-        # A locale may know no letter beyond ASCII.
-        encoding = stream.encoding or "utf-8"
+    # A locale may know no letter beyond ASCII.
+    encoding = stream.encoding or "utf-8"
+    with _losses_noted(stream):
         stream.write(printable(text).encode(encoding, "backslashreplace").decode(encoding))
         stream.flush()
-    except BrokenPipeError:
-        _discard_rest(stream)
+
+
+@contextmanager
+def _losses_noted(stream: TextIO) -> Iterator[None]:
+    try:
+        yield
     except OSError as error:
         # A run goes on without its output; the command as a whole is not done.
-        _lost.append(error)
+        if not isinstance(error, BrokenPipeError):
+            _lost.append(error)
         _discard_rest(stream)
+
+
+class _Handed:
+    """A stream like another one, that hands what is written to a thread."""
+
+    def __init__(self, stream: TextIO, texts: SimpleQueue[tuple[TextIO, str] | None]) -> None:
+        self._stream, self._texts = stream, texts
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any attribute of the other
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        self._texts.put((self._stream, text))
+        return len(text)
+
+    def flush(self) -> None:
+        """The thread writes as soon as the reader takes it."""
+
+
+@contextmanager
+def unhindered_output() -> Iterator[None]:
+    """Have a thread write stdout and stderr: a reader that pauses, as after Ctrl-S, holds up no run.
+
+    Only the end of the context waits until all is read.
+    """
+    texts: SimpleQueue[tuple[TextIO, str] | None] = SimpleQueue()
+    out, err = (one and _Handed(one, texts) for one in (sys.stdout, sys.stderr))
+    writer = Thread(target=_write_all, args=(texts,), name="output", daemon=True)
+    writer.start()
+    try:
+        with redirect_stdout(out), redirect_stderr(err):
+            yield
+    finally:
+        texts.put(None)
+        writer.join()
+
+
+def _write_all(texts: SimpleQueue[tuple[TextIO, str] | None]) -> None:
+    for stream, text in iter(texts.get, None):
+        with _losses_noted(stream):
+            _write_whole(stream, text)
+
+
+def _write_whole(stream: TextIO, text: str) -> None:
+    """Write past the stream's own buffer, which loses what a pipe that does not block has no room for."""
+    try:
+        descriptor = stream.fileno()
+    except OSError:  # in memory
+        stream.write(text)
+        return
+    data = text.encode(stream.encoding or "utf-8", "backslashreplace")
+    while data:
+        try:
+            data = data[os.write(descriptor, data) :]
+        except BlockingIOError:
+            select.select((), (descriptor,), ())
 
 
 def lost_output() -> OSError | None:

@@ -14,6 +14,7 @@ import pytest
 from hexacell import __main__
 from hexacell.cli import app
 from hexacell.cli.commands import cell as commands
+from hexacell.cli.console import Console, lost_output, unhindered_output
 from tests.signals import terminal_signals
 
 
@@ -75,6 +76,22 @@ def test_output_to_a_full_disk_is_an_error_and_no_traceback():
         ended = hexacell("cell", "schema", "--json", stdout=full)
     assert ended.returncode == 2
     assert ended.stderr == "hexacell: the output could not be written: No space left on device\n"
+
+
+@pytest.mark.parametrize("blocks", [True, False])
+def test_a_reader_that_pauses_holds_up_nothing_and_gets_all(monkeypatch, blocks):
+    """As after Ctrl-S, or in a pager: a run watches its robot meanwhile."""
+    reader, writer = os.pipe()
+    os.set_blocking(writer, blocks)
+    said = "word\n" * 100_000
+    with os.fdopen(reader) as read, os.fdopen(writer, "w") as pipe, monkeypatch.context() as patch:
+        patch.setattr(sys, "stdout", pipe)
+        with unhindered_output():
+            Console().print(said)
+            Console().error("later")
+            for rest in [said] if blocks else [said[:99], said[99:]]:
+                assert read.read(len(rest)) == rest
+    assert lost_output() is None
 
 
 def test_letters_that_the_locale_does_not_know_are_escaped(cell_folder):

@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 from drivers.interfaces import DeviceIdentity
-from hexacell.cell.loader import Cell
+from hexacell.cell.loader import Cell, checked_cell
 from hexacell.cell.model import CellSettings
 from hexacell.config.interface import ControllerGeometry
 from hexacell.errors import HexacellError
@@ -23,6 +23,21 @@ from hexacell.services.history.journal_soundness import read_sound
 from procedures.journal.journal import LONGEST_LINE, decode
 from procedures.run.state import RunState
 from procedures.steps.events import RunStarted
+
+OF_NO_RESULT = {"name", "report", "archive", "notifications", "opcua", "unattended"}
+"""Parts of a cell file on which no result depends, as none does on comments and order: all others count."""
+
+
+def has_same_cell(started: RunStarted, cell: Cell) -> bool:
+    """Whether all that the result of a run depends on is in the cell file as it was when it began."""
+    recorded, now = started.cell_text, cell.text_without_secrets
+    if recorded == now:
+        return True
+    with suppress(HexacellError):  # this version may refuse what an older one took
+        settings = [checked_cell(cell.path, text).settings for text in (recorded, now)]
+        before, after = (one.model_dump_json(exclude=OF_NO_RESULT) for one in settings)
+        return before == after
+    return False
 
 
 def started_robot(settings: CellSettings, started: RunStarted) -> Robot:

@@ -19,7 +19,7 @@ from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.design_facts import require_design
 from hexacell.services.devices.device_setup import Connected, device_addresses, open_devices
 from hexacell.services.history.journal_soundness import require_sound
-from hexacell.services.history.recorded_cell import started_robot, with_changes
+from hexacell.services.history.recorded_cell import has_same_cell, started_robot, with_changes
 from hexacell.services.history.resumption import require_own_run
 from hexacell.services.run.accepted_results import last_accepted_result
 from hexacell.storage.atomic_files import read_text, remove_stale_temporaries, write_own
@@ -225,7 +225,7 @@ def _resumed_start(request: RunRequest) -> events.RunStarted:
         raise FileError("the journal is empty", subject=request.folder.journal, action="Begin a new run")
     if state.ended is not None:
         raise UsageError(f"the run {request.folder.path} is over: {state.ended.line}")
-    if state.started.cell_text != request.cell.text_without_secrets:
+    if not has_same_cell(state.started, request.cell):
         raise UsageError(
             f"{request.cell.path} has changed since the run began",
             action="Undo the change, or begin a new run",

@@ -29,6 +29,7 @@ from hexacell.kinematics.parameters import ParameterSet
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.history.journal_soundness import require_sound
+from hexacell.services.history.recorded_cell import has_same_cell
 from hexacell.services.history.resumption import require_own_run
 from hexacell.services.run.replay_run import replay
 from hexacell.verdict.acceptance_gates import AcceptanceGate
@@ -114,12 +115,11 @@ def read_proposal(folder: RunFolder) -> Proposal:
 
 
 def _own_cell(folder: RunFolder, started: events.RunStarted) -> Cell:
-    """The cell that made a run folder: its file is beside ``runs``, as it was when the run began."""
+    """The cell that made a run folder: its file beside ``runs`` has all that the result depends on."""
     for path in filter(is_cell_file, sorted(folder.siblings.parent.parent.glob("*.toml"))):
         with suppress(HexacellError):
             cell = load_cell(path)
-            its = runs_folder(cell).resolve(), cell.text_without_secrets
-            if its == (folder.siblings.resolve(), started.cell_text):
+            if runs_folder(cell).resolve() == folder.siblings.resolve() and has_same_cell(started, cell):
                 return cell
     raise UsageError(
         "the cell file that this run began with is not beside it",

@@ -119,7 +119,7 @@ async def test_a_run_without_a_beginning_cannot_be_resumed(make_site) -> None:
 async def test_a_run_is_resumed_with_the_cell_file_it_began_with(make_site, finished) -> None:
     site = make_site()
     site.write(finished.until(events.RecordTaken), finished)
-    site.cell.path.write_text(site.cell.text + "# changed\n")
+    site.cell.path.write_text(site.cell.text.replace("position_mm = ", "position_mm = 1", 1))
     site.cell = load_cell(site.cell.path)
     with pytest.raises(UsageError, match="has changed since the run began"):
         await site.calibrate(resume=True)

@@ -1,19 +1,21 @@
 """Proposals applied after their run: bit for bit, under the run's own gates, never over an edit."""
 
 import re
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from hexacell import errors
+from hexacell.cell.loader import load_cell
 from hexacell.config.change import Receipt
 from hexacell.config.layout import ConfigLayout
 from hexacell.config.versions import ConfigEditedSince
 from hexacell.config.write_record import NumberChange, later_approval
 from hexacell.kinematics.corrections import Corrections
 from hexacell.runs.cell_lock import cell_lock
-from hexacell.runs.run_folder import RunFolder
+from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.write_back.config_history import config_history
 from hexacell.services.write_back.config_rollback import roll_back_config
 from hexacell.services.write_back.proposals import COMMAND, apply_proposal, read_proposal
@@ -211,6 +213,24 @@ async def test_a_proposal_of_another_run_or_behind_a_link_is_refused(cell, tmp_p
     for one in (run, other):
         with pytest.raises(errors.FileError, match="is not the one of its journal"):
             read_proposal(one.folder)
+
+
+@pytest.mark.parametrize(
+    ("edits", "is_same"),
+    [
+        ({"name = ": "# a note\nname = ", "simulated-hexaglide": "hall 3"}, True),
+        ({"[identification]": '[report]\nplace = "hall 3"\n[identification]'}, True),
+        *(({one: f"{one}1"}, False) for one in ("position_mm = ", "heartbeat_ms = ")),
+    ],
+)
+def test_only_an_edit_on_which_the_result_depends_is_against_it(cell, edits, is_same) -> None:
+    run, text = propose_run(cell), cell.text
+    for old, new in edits.items():
+        text = text.replace(old, new, 1)
+    cell.path.write_text(text)
+    runs = run.folder.siblings.rename(runs_folder(load_cell(cell.path)))
+    with nullcontext() if is_same else pytest.raises(UsageError, match="undo what has changed"):
+        assert read_proposal(RunFolder(runs / run.folder.name)).change == run.change
 
 
 def test_a_run_without_a_proposal_is_refused(cell, tmp_path) -> None:

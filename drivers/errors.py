@@ -51,7 +51,15 @@ class BusError(DeviceError):
 
 
 class SilentNodeError(DeviceError):
-    """A configured encoder no longer responds to SYNC or SDO requests, or its heartbeat is missing."""
+    """A configured encoder no longer responds to SYNC or SDO requests, or its heartbeat is missing.
+
+    Attributes:
+        legs: those that are silent, from 1, where the driver may ask them once more.
+        waited_for: the key of the cell file that says how long.
+    """
+
+    legs: frozenset[int] = frozenset()
+    waited_for = "timeout_s"
 
 
 class RestartedNodeError(DeviceError):
@@ -62,11 +70,7 @@ class InvalidSampleError(DeviceError):
     """An encoder reports an error that makes its position invalid, until it reports that it is gone."""
 
 
-def invalid_sample(
-    what: str,
-    subject: str,
-    action: str = "Remove the cause (magnet, distance, temperature), then measure again",
-) -> InvalidSampleError:
+def invalid_sample(what: str, subject: str, action: str) -> InvalidSampleError:
     """The error for positions that the device itself reports as invalid, or that cannot be."""
     return InvalidSampleError(f"{what}; its position cannot be trusted", subject=subject, action=action)
 
@@ -75,6 +79,10 @@ def silent_encoder(what: str, subject: str, check: str = "its supply and cable")
     """The error for an encoder that does not answer; ``check`` is what may be the cause."""
     action = f"Check {check}, then open the encoders again; the set that was being measured is void"
     return SilentNodeError(what, subject=subject, action=action)
+
+
+TIMES_ASKED, PAUSE_S = 4, 0.1
+"""How often a device is asked that refuses for a reason that may pass, and the pause between."""
 
 
 class NotHomedError(DeviceError):

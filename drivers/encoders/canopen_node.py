@@ -5,22 +5,18 @@ The SDO client can be interrupted, and detects a second device under the same no
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from enum import IntEnum
 
 from canopen.objectdictionary import ObjectDictionary
 from canopen.sdo.client import SdoClient
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from drivers.encoders.can_bus import EncoderBus
-from drivers.encoders.object_dictionary import ObjectEntry
-from drivers.errors import SilentNodeError, silent_encoder
+from drivers.encoders.object_dictionary import NMT, NmtCommand, ObjectEntry
+from drivers.errors import PAUSE_S, TIMES_ASKED, SilentNodeError, silent_encoder
 from hexacell.errors import DeviceError
 
-_NMT = 0x000
 ABSENT = frozenset({0x0602_0000, 0x0609_0011})
 """The abort codes that mean that there is no such entry: no object, no subindex (CiA 301)."""
-TIMES_ASKED, PAUSE_S = 4, 0.1
-"""How often a device is asked that refuses for another reason, which may pass, and the pause between."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,13 +41,6 @@ def subject_of(legs: Sequence[Leg]) -> str:
     return f"{noun} {', '.join(map(str, legs))}"
 
 
-class NmtCommand(IntEnum):
-    """NMT commands (CiA 301)."""
-
-    START = 0x01
-    ENTER_PRE_OPERATIONAL = 0x80
-
-
 class EncoderNode:
     """The CANopen node of one leg's encoder. Integers are read and written as unsigned.
 
@@ -66,7 +55,7 @@ class EncoderNode:
 
     def command(self, command: NmtCommand) -> None:
         """Send an NMT command; nodes do not acknowledge it."""
-        self._bus.network.send_message(_NMT, bytes((command, self.leg.node)))
+        self._bus.network.send_message(NMT, bytes((command, self.leg.node)))
 
     def read(self, entry: ObjectEntry) -> int:
         """The value of a mandatory entry."""
@@ -108,17 +97,19 @@ class EncoderNode:
         except SdoAbortedError as error:
             raise setting_refused(f"refuses to set {entry} to {value:#x}: {error}", self.leg) from error
 
-    def _asked(self, entry: ObjectEntry, call: Callable[[], int | None], times: int = 1) -> int | None:
+    def _asked(self, entry: ObjectEntry, call: Callable[[], int | None]) -> int | None:
         """What a transfer gives, or ``SdoAbortedError``: that of the last time, unless it means absence."""
-        try:
-            return call()
-        except SdoAbortedError as error:
-            if times == TIMES_ASKED or error.code in ABSENT:
-                raise
-        except SdoCommunicationError as error:
-            raise self._communication_error(entry, error) from error
-        self._bus.listen(PAUSE_S)
-        return self._asked(entry, call, times + 1)
+        left = TIMES_ASKED
+        while True:
+            try:
+                return call()
+            except SdoAbortedError as error:
+                left -= 1
+                if not left or error.code in ABSENT:
+                    raise
+            except SdoCommunicationError as error:
+                raise self._communication_error(entry, error) from error
+            self._bus.listen(PAUSE_S)
 
     def check_alone(self) -> None:
         """Raise if a second device responded under this node id."""
@@ -128,7 +119,7 @@ class EncoderNode:
     def _communication_error(self, entry: ObjectEntry, error: Exception) -> DeviceError:
         self.check_alone()
         if not self.sdo.latest:
-            return silent_encoder(f"does not respond for {entry}: {error}", self.leg.subject)
+            return silent_nodes(f"does not respond for {entry}: {error}", [self.leg])
         return DeviceError(
             f"does not respond as it should for {entry}, but {self.sdo.latest.hex(' ')}: {error}",
             subject=self.leg.subject,
@@ -155,6 +146,13 @@ def duplicated_node(what: str, leg: Leg) -> DeviceError:
 THE_BUS = "the CAN adapter, supply and termination"
 
 
+def silent_nodes(what: str, legs: Sequence[Leg], check: str = "its supply and cable") -> SilentNodeError:
+    """The error for encoders that do not answer; ``check`` is what may be the cause."""
+    error = silent_encoder(what, subject_of(legs), check)
+    error.legs = frozenset(leg.number for leg in legs)
+    return error
+
+
 def explained(error: SilentNodeError, nodes: Sequence[EncoderNode], bus: EncoderBus) -> SilentNodeError:
     """The error with all that are silent now, and advice that fits to those that answer.
 
@@ -167,15 +165,15 @@ def explained(error: SilentNodeError, nodes: Sequence[EncoderNode], bus: Encoder
         bus.wait_for(lambda: all(node.sdo.has_responded for node in nodes), nodes[0].sdo.timeout_s)
     finally:
         bus.health_check = health_check
-    named = [node.leg for node in nodes if str(node.leg) in (error.subject or "")]
+    named = [node.leg for node in nodes if node.leg.number in error.legs]
     silent = [node.leg for node in nodes if not node.sdo.has_responded]
     if len(silent) == len(nodes):
         what = f"{error.problem}; no encoder answers{bus.reported}"
-        return silent_encoder(what, subject_of(silent), THE_BUS)
+        return silent_nodes(what, silent, THE_BUS)
     if set(named) & set(silent):
-        return silent_encoder(f"{error.problem}; the others answer", subject_of(silent))
-    check = THE_BUS if len(named) == len(nodes) else "its supply for a dip, and timeout_s"
-    return silent_encoder(f"{error.problem}, but SDO requests are answered", subject_of(named), check)
+        return silent_nodes(f"{error.problem}; the others answer", silent)
+    check = THE_BUS if len(named) == len(nodes) else f"its supply for a dip, and {error.waited_for}"
+    return silent_nodes(f"{error.problem}, but SDO requests are answered", named, check)
 
 
 SDO_REQUEST = 0x600

@@ -8,9 +8,9 @@ from typing import ClassVar
 from drivers.encoders import node_identity
 from drivers.encoders.bank import BankSession, ThreadedBank, bus_settings
 from drivers.encoders.can_bus import EncoderBus
-from drivers.encoders.canopen_node import EncoderNode, Leg, NmtCommand, explained
+from drivers.encoders.canopen_node import EncoderNode, Leg, explained
 from drivers.encoders.node_monitor import AlarmPoll, AlarmTiming, NodeMonitor, check_nodes
-from drivers.encoders.object_dictionary import DeviceType
+from drivers.encoders.object_dictionary import DeviceType, NmtCommand
 from drivers.encoders.sync_sampling import SyncSampler, configure_position_tpdo, follow_plain_sync
 from drivers.errors import SilentNodeError
 from drivers.interfaces import DeviceIdentity

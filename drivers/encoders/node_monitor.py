@@ -8,9 +8,15 @@ from dataclasses import dataclass
 from canopen.emcy import EmcyError
 
 from drivers.encoders.can_bus import EncoderBus
-from drivers.encoders.canopen_node import EncoderNode, Leg, subject_of
-from drivers.encoders.object_dictionary import ALARMS, ERROR_REGISTER, PRODUCER_HEARTBEAT, WARNINGS
-from drivers.errors import RestartedNodeError, invalid_sample, silent_encoder
+from drivers.encoders.canopen_node import EncoderNode, Leg, silent_nodes, subject_of
+from drivers.encoders.object_dictionary import (
+    ALARMS,
+    ERROR_REGISTER,
+    PRODUCER_HEARTBEAT,
+    WARNINGS,
+    ObjectEntry,
+)
+from drivers.errors import RestartedNodeError, invalid_sample
 
 HEARTBEAT = 0x700
 EMERGENCY = 0x080
@@ -22,8 +28,6 @@ OPERATIONAL = 0x05
 
 _COMMUNICATION = 0x10
 """Bit of the error register for communication errors, which do not concern positions."""
-_COMMUNICATION_CLASS = 0x8
-"""The first digit of the codes of communication errors (CiA 301, table of error codes)."""
 
 MAX_MISSED_HEARTBEATS = 3
 """So many consecutive missing heartbeats are a failure."""
@@ -35,7 +39,36 @@ _KNOWN_EMERGENCIES = {
     0x8130: "its heartbeat monitoring tripped",
     0x8240: "it expects another length of SYNC",
 }
-_CHECK_BUS = "Open the encoders again; if it stays so, set the node with its vendor's tool"
+_RESTART = "Switch it off and on, then open the encoders again; if it stays so, replace it"
+_ACTIONS = {
+    "2": "Check its cable for a short circuit, then measure again",
+    "3": "Check the voltage of its supply at the encoder, then measure again",
+    "4": "Let it cool, or warm up, and see what heats it; then measure again",
+    "5": _RESTART,
+    "6": _RESTART,
+    "8": "Open the encoders again; if it stays so, set the node with its vendor's tool",
+    "81": "Check cable, termination and bit rate of the bus, then open the encoders again",
+    "8130": "Open the encoders again; if it stays so, switch its heartbeat consumer (1016h) off",
+    "8150": "Give each device on the bus a node id of its own, then open the encoders again",
+    "FF00": "Remove the cause (magnet, distance, dirt, temperature), then measure again",
+    "battery": "Change its battery, then open the encoders again",
+    "age": "It is old: replace it soon; until then open the encoders again",
+    "speed": "State a lower speed in [speed], then measure again",
+}
+"""By how the code of an emergency begins (CiA 301, table of error codes), and by what bits mean."""
+_BITS = {
+    ERROR_REGISTER: {1: "2", 2: "3", 3: "4"},
+    ALARMS: {0: "FF00"},
+    WARNINGS: {0: "speed", 1: "FF00", 2: "6", 3: "age", 4: "battery"},
+}
+"""What the bits of an entry mean (CiA 301, CiA 406); others are their makers'."""
+
+
+def advice_for(entry: ObjectEntry, value: int, code: str = "") -> str:
+    """What to do, by the code of an emergency, or else by the lowest bit that has a known meaning."""
+    keys = [code, code[:2], code[:1], *(key for bit, key in _BITS[entry].items() if value >> bit & 1)]
+    unknown = "Look up what it means in the encoder's manual, and remove that; then measure again"
+    return next((_ACTIONS[key] for key in keys if key in _ACTIONS), unknown)
 
 
 class NodeMonitor:
@@ -44,7 +77,7 @@ class NodeMonitor:
     Attributes:
         restarted: the node has booted or left OPERATIONAL; remains set.
         emergency: the reported error, until the node reports that it is gone.
-        is_about_the_bus: whether that error is one of communication.
+        action: what to do then.
         emergencies: the number of reported errors.
     """
 
@@ -52,7 +85,7 @@ class NodeMonitor:
         self.leg = leg
         self.restarted = False
         self.emergency: str | None = None
-        self.is_about_the_bus = False
+        self.action = ""
         self.emergencies = 0
         self.timeout_s = MAX_MISSED_HEARTBEATS * heartbeat_ms / 1000 + JITTER_S
         self._heartbeat_ms = heartbeat_ms
@@ -101,7 +134,7 @@ class NodeMonitor:
         self.emergencies += 1
         words = _KNOWN_EMERGENCIES.get(code) or EmcyError(code, register, b"", 0.0).get_desc().lower()
         self.emergency = f"emergency {code:04X} ({words}, error register {register:#04x})"
-        self.is_about_the_bus = code >> 12 == _COMMUNICATION_CLASS
+        self.action = advice_for(ERROR_REGISTER, register if len(data) > 2 else 0, f"{code:04X}")
         self._condition.notify_all()
 
 
@@ -118,11 +151,12 @@ def check_nodes(monitors: Sequence[NodeMonitor]) -> None:
     silent = [monitor for monitor in monitors if monitor.is_silent(now_s)]
     if silent:
         what = f"no heartbeat for {silent[0].timeout_s:.2g} s"
-        raise silent_encoder(what, subject_of([monitor.leg for monitor in silent]))
+        error = silent_nodes(what, [monitor.leg for monitor in silent])
+        error.waited_for = "heartbeat_ms"
+        raise error
     for monitor in monitors:
         if monitor.emergency is not None:
-            action = (_CHECK_BUS,) if monitor.is_about_the_bus else ()
-            raise invalid_sample(f"reports {monitor.emergency}", monitor.leg.subject, *action)
+            raise invalid_sample(f"reports {monitor.emergency}", monitor.leg.subject, monitor.action)
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,9 +228,10 @@ class AlarmPoll:
             value = node.read(entry)
             if entry is ERROR_REGISTER:
                 value &= ~_COMMUNICATION
-            if value & ~self._known.get((node, entry), 0):
+            if found := value & ~self._known.get((node, entry), 0):
                 word = "a warning" if entry is WARNINGS else "an alarm"
-                raise invalid_sample(f"has {word} ({entry} is {value:#06x})", node.leg.subject)
+                action = advice_for(entry, found)
+                raise invalid_sample(f"has {word} ({entry} is {value:#06x})", node.leg.subject, action)
         self._emergencies_seen = emergencies
         self._polled_s, self._sampling_s = time.monotonic(), 0.0
         self._cost_s = self._polled_s - now_s

@@ -18,6 +18,16 @@ class ObjectEntry:
         return f"object {self.index:04X}h:{self.subindex}"
 
 
+NMT = 0x000
+
+
+class NmtCommand(IntEnum):
+    """NMT commands (CiA 301)."""
+
+    START = 0x01
+    ENTER_PRE_OPERATIONAL = 0x80
+
+
 class DeviceType(IntEnum):
     """The supported values of 1000h: profile 406 and the encoder class."""
 

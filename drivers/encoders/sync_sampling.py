@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 from drivers.encoders import object_dictionary as od
 from drivers.encoders.can_bus import EncoderBus
-from drivers.encoders.canopen_node import EncoderNode, Leg, duplicated_node, setting_refused, subject_of
+from drivers.encoders.canopen_node import EncoderNode, Leg, duplicated_node, setting_refused, silent_nodes
 from drivers.encoders.object_dictionary import DeviceType, ObjectEntry
-from drivers.errors import BusError, silent_encoder
+from drivers.errors import BusError
 from hexacell.errors import DeviceError
 
 SYNC = 0x080
@@ -155,7 +155,7 @@ class SyncSampler:
     bus: EncoderBus
     timeout_s: float
     signed: bool
-    _foreign_sync: bool = False
+    _other_master: str = ""
 
     def __post_init__(self) -> None:
         self._outstanding = [0] * len(self.legs)
@@ -164,7 +164,8 @@ class SyncSampler:
         self._index = {channel.cob_id: index for index, channel in enumerate(self.channels)}
         for channel in self.channels:
             self.bus.network.subscribe(channel.cob_id, self._on_position)
-        self.bus.network.subscribe(SYNC, self._on_foreign_sync)
+        for can_id in (SYNC, od.NMT):
+            self.bus.network.subscribe(can_id, self._on_other_master)
 
     def sample(self) -> tuple[int, ...]:
         """One complete sample, the counts of all legs, after at most ``MAX_SYNCS`` SYNCs.
@@ -185,16 +186,16 @@ class SyncSampler:
             return self._received()
         silent = [leg for leg, left in zip(self.legs, self._outstanding, strict=True) if left > 0]
         what = f"no response to SYNC within {self.timeout_s:g} s, {MAX_SYNCS} times"
-        raise silent_encoder(what, subject_of(silent))
+        raise silent_nodes(what, silent)
 
     def check(self) -> None:
-        """Raise if a leg sent more positions than there were SYNCs, or another master sends SYNC."""
+        """Raise if a leg sent more positions than there were SYNCs, or another master commands them."""
         if min(self._outstanding) < 0:
             leg = self.legs[self._outstanding.index(min(self._outstanding))]
             raise duplicated_node("sent more positions than there were SYNCs", leg)
-        if self._foreign_sync:
+        if self._other_master:
             raise BusError(
-                "another master sends SYNC on it, or its adapter echoes what is sent",
+                f"another master sends {self._other_master} on it, or its adapter echoes what is sent",
                 subject=self.bus.name,
                 action="Give the encoders a bus of their own, or switch the other master off",
             )
@@ -224,5 +225,9 @@ class SyncSampler:
         if self._is_complete():
             self.bus.condition.notify_all()
 
-    def _on_foreign_sync(self, _can_id: int, _data: bytearray, _timestamp: float) -> None:
-        self._foreign_sync = True
+    def _on_other_master(self, can_id: int, data: bytearray, _timestamp: float) -> None:
+        ours = {0, *(leg.node for leg in self.legs)}
+        if can_id == SYNC:
+            self._other_master = "SYNC"
+        elif data[:1] != bytes([od.NmtCommand.START]) and ours & {*data[1:2]}:
+            self._other_master = "NMT commands that stop encoders"

@@ -14,7 +14,7 @@ from functools import partial
 from importlib import import_module
 from typing import Any
 
-from drivers.errors import optional
+from drivers.errors import PAUSE_S, TIMES_ASKED, optional
 from drivers.serial.opening import SLICE_S, lost_port, opened_port, sent
 from drivers.serial.received import is_text, quoted
 from drivers.serial.request_port import NoAnswer, RequestPort, is_copies
@@ -45,8 +45,6 @@ EXCEPTIONS = {
 }
 NOT_THERE, BUSY = (2, 3), (5, 6)
 """Those that mean that there are no such registers, or not so many in one answer; those that pass."""
-TIMES_ASKED, PAUSE_S = 4, 0.1
-"""How often a busy device is asked, and the pause between."""
 LINE_KEYS = ("baudrate", "bytesize", "parity", "stopbits")
 
 # Failures are raised as errors; without a handler pymodbus would also print them.

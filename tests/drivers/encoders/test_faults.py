@@ -8,7 +8,8 @@ import pytest
 from drivers.encoders import node_monitor
 from drivers.encoders.can_bus import ERROR_FRAMES
 from drivers.encoders.cia406 import Cia406Bank, EncoderSession
-from drivers.encoders.node_monitor import AlarmTiming
+from drivers.encoders.node_monitor import AlarmTiming, advice_for
+from drivers.encoders.object_dictionary import ALARMS, ERROR_REGISTER, WARNINGS
 from drivers.errors import BusError, InvalidSampleError, RestartedNodeError, SilentNodeError
 from tests.waiting import until
 
@@ -32,7 +33,7 @@ async def test_an_emergency_makes_samples_invalid_until_it_is_cleared(raw, opene
     ("data", "words"),
     [
         ("3081110000000000", "8130 .its heartbeat monitoring tripped, error register 0x11"),
-        ("0042090000000000", "4200 .temperature"),
+        ("0042090000000000", "4200 .temperature.*Let it cool"),
         ("0000200000000000", "0000 .*error register 0x20"),  # one error gone, another is left
         ("00ff", "FF00 .no magnet, error register 0xff"),
         ("", "emergency FFFF"),
@@ -43,6 +44,37 @@ async def test_an_emergency_that_is_no_complete_reset_is_an_error(raw, opened, d
     await raw.delivered_to(opened)
     with pytest.raises(InvalidSampleError, match=rf"leg 1 .*{words}"):
         await opened.read()
+
+
+ADVICE = [
+    (ERROR_REGISTER, 0, "2310", "short circuit"),
+    (ERROR_REGISTER, 0, "3120", "voltage of its supply"),
+    (ERROR_REGISTER, 0, "4200", "Let it cool"),
+    (ERROR_REGISTER, 0, "5200", "Switch it off and on"),
+    (ERROR_REGISTER, 0, "6010", "Switch it off and on"),
+    (ERROR_REGISTER, 0, "8120", "termination and bit rate"),
+    (ERROR_REGISTER, 0, "8130", "heartbeat consumer"),
+    (ERROR_REGISTER, 0, "8150", "node id of its own"),
+    (ERROR_REGISTER, 0, "8210", "vendor's tool"),
+    (ERROR_REGISTER, 0, "FF00", "magnet, distance"),
+    (ERROR_REGISTER, 0, "FF77", "Look up what it means"),
+    (ERROR_REGISTER, 0x02, "1000", "short circuit"),
+    (ERROR_REGISTER, 0x05, "FF01", "voltage of its supply"),
+    (ERROR_REGISTER, 0x09, "", "Let it cool"),
+    (ERROR_REGISTER, 0x81, "", "Look up what it means"),
+    (ALARMS, 0x0001, "", "magnet, distance"),
+    (ALARMS, 0x1000, "", "Look up what it means"),
+    (WARNINGS, 0x01, "", "lower speed"),
+    (WARNINGS, 0x02, "", "magnet, distance, dirt"),
+    (WARNINGS, 0x04, "", "Switch it off and on"),
+    (WARNINGS, 0x08, "", "replace it"),
+    (WARNINGS, 0x10, "", "Change its battery"),
+]
+
+
+@pytest.mark.parametrize(("entry", "bits", "code", "told"), ADVICE)
+def test_what_a_device_says_of_itself_decides_what_to_do(entry, bits, code, told):
+    assert told in advice_for(entry, bits, code)
 
 
 async def test_an_emergency_during_a_sample_makes_it_invalid(raw, opened):
@@ -165,7 +197,8 @@ async def test_heartbeats_are_requested_and_their_loss_is_an_error(raw, make_ban
     await heartbeats.advance(bank, 0.24)
     await bank.read()
     await heartbeats.advance(bank, 0.04)
-    with pytest.raises(SilentNodeError, match=r"encoder of leg 5 \(node 5\): no heartbeat for 0.26 s"):
+    told = r"leg 5 \(node 5\): no heartbeat for 0.26 s, but SDO requests are answered.* and heartbeat_ms"
+    with pytest.raises(SilentNodeError, match=told):
         await bank.read()
 
 
@@ -194,7 +227,9 @@ async def test_a_warning_that_comes_during_a_run_makes_samples_invalid(raw, bank
     await bank.open()
     await bank.read()
     raw.nodes[2].objects[0x6505, 0] = b"\x05\0"
-    with pytest.raises(InvalidSampleError, match=r"leg 2 .*has a warning \(object 6505h:0 is 0x0005\)"):
+    with pytest.raises(
+        InvalidSampleError, match=r"leg 2 .*has a warning \(object 6505h:0 is 0x0005\).*off and on"
+    ):
         await bank.read()
 
 

@@ -5,7 +5,7 @@ import pytest
 from drivers.discovery import SearchTimeouts
 from drivers.discovery.encoders import search_bus
 from drivers.encoders import canopen_node
-from drivers.errors import InvalidSampleError
+from drivers.errors import TIMES_ASKED, InvalidSampleError
 from hexacell.errors import DeviceError
 
 NOT_NOW, HARDWARE, NO_SUBINDEX = 0x0800_0022, 0x0606_0000, 0x0609_0011
@@ -57,7 +57,7 @@ async def test_what_stays_refused_is_an_error_with_object_and_code(raw, bank, ke
     told = rf"leg 5 \(node 5\).*refuses 4 times to read object {key[0]:04X}h:{key[1]}: Code 0x{code:08X}"
     with pytest.raises(DeviceError, match=told):
         await bank.open()
-    assert len(asked) == canopen_node.TIMES_ASKED + (key == (0x1000, 0))  # and the probe
+    assert len(asked) == TIMES_ASKED + (key == (0x1000, 0))  # and the probe
 
 
 async def test_a_missing_subindex_is_absence_and_asked_once(raw, bank):

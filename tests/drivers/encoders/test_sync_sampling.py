@@ -3,6 +3,7 @@
 import asyncio
 import math
 import threading
+from contextlib import nullcontext
 
 import pytest
 
@@ -128,10 +129,20 @@ async def test_a_surplus_position_never_passes_for_that_of_a_later_sync(raw, ope
             await opened.read()
 
 
-async def test_sync_of_another_master_is_an_error(raw, opened):
-    raw.send(0x80)
+@pytest.mark.parametrize(
+    ("can_id", "data", "told"),
+    [
+        (0x80, b"", "SYNC"),
+        (0, b"\x80\x00", "NMT"),
+        (0, b"\x02\x03", "NMT"),
+        (0, b"\x81\x7f", ""),
+        (0, b"\x01\x00", ""),
+    ],
+)
+async def test_commands_of_another_master_to_encoders_are_an_error(raw, opened, can_id, data, told):
+    raw.send(can_id, data)
     await raw.delivered_to(opened)
-    with pytest.raises(BusError, match="another master sends SYNC"):
+    with pytest.raises(BusError, match=f"another master sends {told}") if told else nullcontext():
         await opened.read()
 
 

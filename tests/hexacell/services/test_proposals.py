@@ -229,7 +229,7 @@ def test_only_an_edit_on_which_the_result_depends_is_against_it(cell, edits, is_
         text = text.replace(old, new, 1)
     cell.path.write_text(text)
     runs = run.folder.siblings.rename(runs_folder(load_cell(cell.path)))
-    with nullcontext() if is_same else pytest.raises(UsageError, match="undo what has changed"):
+    with nullcontext() if is_same else pytest.raises(errors.UsageError, match="undo what has changed"):
         assert read_proposal(RunFolder(runs / run.folder.name)).change == run.change
 
 

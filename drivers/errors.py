@@ -51,12 +51,7 @@ class BusError(DeviceError):
 
 
 class SilentNodeError(DeviceError):
-    """A configured encoder no longer responds to SYNC or SDO requests, or its heartbeat is missing.
-
-    Attributes:
-        legs: those that are silent, from 1, where the driver may ask them once more.
-        waited_for: the key of the cell file that says how long.
-    """
+    """Encoders, of ``legs`` where known, are silent for longer than the key ``waited_for`` says."""
 
     legs: frozenset[int] = frozenset()
     waited_for = "timeout_s"

@@ -19,7 +19,7 @@ from canopen.lss import CS_INQUIRE_VENDOR_ID, LssError, LssMaster
 
 from drivers.discovery import USUAL, SearchTimeouts
 from drivers.encoders import object_dictionary as od
-from drivers.encoders.can_bus import EncoderBus, is_canopen
+from drivers.encoders.can_bus import EncoderBus, advice_on, is_canopen
 from drivers.encoders.canopen_node import EncoderNode, Leg
 from drivers.encoders.object_dictionary import DeviceType
 from drivers.errors import BusError
@@ -161,6 +161,7 @@ def search_bus(bus: Mapping[str, Any], timeouts: SearchTimeouts = USUAL) -> BusF
                 nodes = tuple(_described(opened, node, timeouts.node) for node in ids)
             except BusError as error:
                 action = "Check cable and termination, or try another bit rate"
+                action = advice_on(error.__cause__) or action
                 raise BusError(error.problem, subject=opened.name, action=action) from error
             return BusFindings(bus, nodes, frames_of_no_node(frames, ids))
     except HexacellError as error:

@@ -1,6 +1,7 @@
 """The CAN bus of the encoders: one receiving thread, and a time limit on every wait."""
 
 import logging
+import re
 import threading
 import time
 from collections import deque
@@ -35,12 +36,17 @@ FAULTS = {0x40: "bus off", 0x20: "nobody acknowledges", 0x88: "damaged frames", 
 NO_FRAME = "what comes from it is no frame"
 CHECK_BUS = "Check the CAN adapter, its cable, supply, bit rate and termination"
 ADVICE = {
-    "Permission denied": "Give this user the right to use it (docs/howto-host.md)",
-    "busy": "End the other program that uses it",
-    "Network is down": "Switch the CAN interface on (docs/howto-host.md)",
-    NO_FRAME: "End other programs that read this port, and plug the adapter into a USB port of its own",
+    "(permission|access) denied": "Give this user the right to use it (docs/howto-host.md)",
+    "busy|exclusively lock": "End the other program that uses it, or ModemManager (docs/howto-host.md)",
+    "network is down": "Switch the CAN interface on (docs/howto-host.md)",
+    f"{NO_FRAME}|multiple access": "End other programs that read this port, and plug the adapter into a "
+    "USB port of its own",
+    "address family": "Load the kernel's modules for CAN: sudo modprobe -a can can_raw",
+    "connection refused|timed out|unreachable": "Start the adapter's server, or correct channel in `bus`",
+    "cannot import|library|is not defined": "Install its maker's library, or correct interface in `bus`",
+    "unknown interface|bitrate|(positional|keyword) argument|specify|ioctl|is a dir": "Correct `bus`",
 }
-"""What to do, by what is in the message of a failure."""
+"""What to do, by what is in the message of a failure, of the adapter, of pyserial or of the system."""
 
 # Failures are raised as errors; without a handler canopen would also print them.
 logging.getLogger("canopen").addHandler(logging.NullHandler())
@@ -70,6 +76,7 @@ class EncoderBus:
         self._interrupted = interrupted
         self._wire = LineRecord(self.name, trace)
         self._accepts = accepts or is_canopen
+        self.hears = False  # a whole frame of anybody: its bit rate is right
         self._failure: Exception | None = None
         self._error_frames: deque[float] = deque(maxlen=ERROR_FRAMES)
         self.reported, self._numbers_as_linux = "", settings.get("interface") in NUMBERED_AS_LINUX
@@ -122,7 +129,7 @@ class EncoderBus:
             return _read_as_lines(can.Bus(**settings))
         except Exception as error:  # the interfaces of python-can raise errors of any class
             action = "Plug the CAN adapter in, or correct `bus` under [encoders] in the cell file"
-            action = _advice(error) or action
+            action = advice_on(error) or action
             raise BusError(f"cannot be opened: {_text(error)}", subject=self.name, action=action) from error
 
     def _receive(self) -> None:
@@ -138,6 +145,7 @@ class EncoderBus:
                     continue
                 if message is None:
                     continue
+                self.hears |= not message.is_error_frame
                 if message.is_error_frame:
                     bits = message.arbitration_id if self._numbers_as_linux else 0
                     self._count_fault(", ".join(name for bit, name in FAULTS.items() if bits & bit))
@@ -178,7 +186,7 @@ class EncoderBus:
         return BusError(
             f"{what}: {_text(cause)}",
             subject=self.name,
-            action=f"{_advice(cause) or CHECK_BUS}, then open the encoders again; the set that was being "
+            action=f"{advice_on(cause) or CHECK_BUS}, then open the encoders again; the set that was being "
             "measured is void",
         )
 
@@ -213,11 +221,13 @@ def _read_as_lines(bus: can.BusABC) -> can.BusABC:
     return bus
 
 
-def _advice(error: Exception) -> str | None:
-    return next((advice for words, advice in ADVICE.items() if words in _text(error)), None)
+def advice_on(error: BaseException | None) -> str | None:
+    """What to do after a failure whose cause its message has; None if that is not known."""
+    said = "" if error is None else _text(error)
+    return next((ADVICE[words] for words in ADVICE if re.search(words, said, re.IGNORECASE)), None)
 
 
-def _text(error: Exception) -> str:
+def _text(error: BaseException) -> str:
     """The message, and that of its cause: python-can wraps the errors of the libraries it uses."""
     cause = "" if error.__cause__ is None else str(error.__cause__)
     return str(error) if cause in str(error) else f"{error} ({cause})"

@@ -49,9 +49,10 @@ def detect_nodes(nodes: Sequence[EncoderNode], bus: EncoderBus, timeout_s: float
         bus.listen(SECOND_RESPONSE_S)
         unexpected = sorted(set(bus.network.scanner.nodes) - {node.leg.node for node in nodes})
         found = ", ".join(map(str, unexpected))
-        hint = f"; node {found} is on the bus but belongs to no leg" if unexpected else ""
+        hint = "; others send" if bus.hears and len(missing) == len(nodes) else ""
+        hint = f"; node {found} is on the bus but belongs to no leg" if unexpected else hint
         odd = [node for node in missing if node.sdo.latest or node.leg.node in bus.network.scanner.nodes]
-        is_alone = len(missing) == len(nodes) and not (unexpected or odd)
+        is_alone = len(missing) == len(nodes) and not bus.hears
         where = "the CAN adapter, supply, cable, termination, bit rate" if is_alone else "supply, cable"
         action = f"Check {where} and node id"
         if len(odd) == len(missing):
@@ -69,7 +70,8 @@ def read_device_type(node: EncoderNode, unit: JointUnit = JointUnit.MM) -> Devic
         profile, kind = value & 0xFFFF, value >> 16
         what = f"profile {profile}; encoders are {od.ENCODER_PROFILE}"
         if profile == od.ENCODER_PROFILE:
-            what = f"an encoder, but of class {kind}; linear ones are 8 and 10"
+            classes = " and ".join(str(one >> 16) for one in DeviceType if one.unit is unit)
+            what = f"an encoder, but of class {kind}; {wanted} ones are {classes}"
         raise DeviceError(
             f"is no absolute {wanted} encoder: its device type is 0x{value:08X} ({what})",
             subject=node.leg.subject,

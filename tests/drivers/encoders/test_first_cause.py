@@ -1,5 +1,9 @@
 """A message of silent or jumping encoders names the cause that is known, and advice that fits to it."""
 
+import asyncio
+import threading
+from unittest.mock import Mock
+
 import can
 import pytest
 
@@ -7,6 +11,7 @@ from drivers.encoders.can_bus import EncoderBus
 from drivers.errors import BusError, InvalidSampleError, SilentNodeError
 from hexacell.errors import DeviceError
 from tests.drivers.encoders.conftest import short_timeout
+from tests.waiting import until
 
 
 @pytest.mark.parametrize(
@@ -64,6 +69,43 @@ async def test_a_count_that_begins_anew_is_no_weak_magnet(raw, make_bank, change
         await bank.read()
 
 
+BUSES = [
+    ({"interface": "nope", "channel": 0}, "Unknown interface .*Correct `bus`"),
+    ({"interface": "slcan"}, "Correct `bus`"),
+    ({"interface": "slcan", "channel": "loop://", "bitrate": 123}, "Invalid bitrate.*Correct `bus`"),
+    ({"interface": "slcan", "channel": "/dev/null"}, "ioctl.*Correct `bus`"),
+    ({"interface": "slcan", "channel": "/"}, "Is a directory.*Correct `bus`"),
+    ({"interface": "slcan", "channel": "/dev/ttyACM9"}, "Plug the CAN adapter in"),
+    ({"interface": "slcan", "channel": "socket://127.0.0.1:1"}, "Start the adapter's server"),
+    (OSError("pcanbasic library not found."), "Install its maker's library"),
+    (PermissionError(13, "Permission denied"), "Give this user the right"),
+    (OSError(13, "Access denied (insufficient permissions)"), "Give this user the right"),
+    (OSError(16, "Device or resource busy"), "or ModemManager"),
+    (OSError(11, "Could not exclusively lock port"), "or ModemManager"),
+    (OSError(97, "Address family not supported by protocol"), "modprobe"),
+    (OSError(19, "No such device"), "Plug the CAN adapter in"),
+]
+
+
+@pytest.mark.parametrize(("bus", "told"), BUSES)
+def test_why_an_adapter_cannot_be_opened_is_told(monkeypatch, bus, told):
+    if isinstance(bus, Exception):
+        monkeypatch.setattr(can, "Bus", Mock(side_effect=bus))
+        bus = {"channel": "can0"}
+    with pytest.raises(BusError, match=told):
+        EncoderBus(bus, threading.Event())
+
+
+async def test_frames_of_others_show_that_the_bit_rate_is_right(raw, make_bank):
+    raw.nodes.clear()
+    bank = make_bank(timeout_s=0.2)
+    opening = asyncio.create_task(bank.open())
+    await until(lambda: raw.heard or opening.done())
+    raw.send(0x1F0, b"x", is_extended_id=True)
+    with pytest.raises(BusError, match=r"others send\. Check supply, cable and node id"):
+        await opening
+
+
 DAMAGED = can.CanOperationError("Could not read: can't decode byte 0xff")
 DAMAGED.__cause__ = ValueError()
 
@@ -77,6 +119,8 @@ DAMAGED.__cause__ = ValueError()
         (IndexError("of a line that was cut"), "no frame .*End other programs that read this port"),
         (DAMAGED, "no frame .*can't decode.*End other programs that read this port"),
         (can.CanOperationError("Network is down"), "Switch the CAN interface on"),
+        (can.CanOperationError("returned no data (multiple access on port?)"), "End other programs"),
+        (OSError(19, "No such device"), "Check the CAN adapter, its cable"),
     ],
 )
 async def test_what_the_adapter_reports_is_told(raw, opened, monkeypatch, fault, told):

@@ -1,6 +1,10 @@
 """Only the codes that mean absence make an entry absent; any other refusal is asked again, then told."""
 
+from unittest.mock import Mock
+
+import can
 import pytest
+from can.interfaces.virtual import VirtualBus
 
 from drivers.discovery import SearchTimeouts
 from drivers.discovery.encoders import search_bus
@@ -99,3 +103,9 @@ def test_a_search_tells_the_nodes_beside_one_that_refuses(raw):
     assert [one.node for one in found.nodes] == [1, 2, 3, 4, 5, 6]
     assert "it refuses 4 times to read object 1000h:0: Code 0x06060000" in found.nodes[3].description
     assert found.nodes[3].unit is None
+
+
+def test_a_search_tells_what_the_failure_of_its_bus_says(raw, monkeypatch):
+    bus, down = {"interface": "virtual", "channel": raw.channel}, can.CanOperationError("Network is down")
+    monkeypatch.setattr(VirtualBus, "send", Mock(side_effect=down))
+    assert "Switch the CAN interface on" in search_bus(bus, QUICK).problem

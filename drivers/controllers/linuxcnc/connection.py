@@ -1,6 +1,7 @@
 """One connection to linuxcncrsh: greeting, then one command and one response at a time."""
 
 import asyncio
+import errno
 import logging
 import os
 import re
@@ -159,7 +160,7 @@ class Connection:
         if self._outstanding is not None:
             await self._outstanding_response(self._outstanding, self.timeouts.answer)
         if self.reader.at_eof():
-            raise ConnectionLost("closed the connection", subject=self.subject)
+            raise self._closed()
 
     async def take_control(self, timeout_s: float | None = None) -> None:
         """Become the client that may command; on LinuxCNC 2.9 the previous one loses control.
@@ -226,7 +227,7 @@ class Connection:
             self.writer.write(line)
             await self.writer.drain()
         except OSError as error:
-            raise ConnectionLost("closed the connection", subject=self.subject) from error
+            raise self._closed() from error
 
     async def _outstanding_response(self, command: str, timeout_s: float) -> protocol.Response:
         patience, remarks = _patience(timeout_s), list[str]()
@@ -265,13 +266,16 @@ class Connection:
             self._record(TrafficDirection.RECEIVED, data)
             if not data:
                 _log.warning("%s: the connection was closed", self.subject)
-                raise ConnectionLost(
-                    "closed the connection: it was ended or restarted",
-                    subject=self.subject,
-                    action="Start LinuxCNC if it does not run",
-                )
+                raise self._closed()
             self._lines.extend(self._buffer.feed(data))
         return self._lines.popleft()
+
+    def _closed(self) -> ConnectionLost:
+        what, action = "it was ended or restarted", "Start LinuxCNC if it does not run"
+        if not self.server:  # it counts those that have left as well
+            what = "it ends, or takes no more clients than the --sessions that it was started with"
+            action = "Restart LinuxCNC, with linuxcncrsh without --sessions"
+        return ConnectionLost(f"closed the connection: {what}", subject=self.subject, action=action)
 
     def _record(self, direction: TrafficDirection, data: bytes) -> None:
         if self._wire.is_on:
@@ -294,15 +298,14 @@ def without_passwords(data: bytes, settings: ControllerSettings) -> bytes:
 async def _connect(
     settings: ControllerSettings, timeouts: protocol.Timeouts
 ) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
-    start = "Start LinuxCNC with DISPLAY = linuxcncrsh --port N, or correct controller.host and .port"
     try:
         async with asyncio.timeout(timeouts.connect):
             return await asyncio.open_connection(settings.host, settings.port)
-    except TimeoutError:
-        problem = f"cannot be reached within {timeouts.connect:g} s"
-        raise ConnectionLost(problem, subject=protocol.subject_of(settings), action=start) from None
     except OSError as error:
         number = error.errno or 0  # negative from getaddrinfo, which has its own text
-        reason = os.strerror(number) if number > 0 else error.strerror
-        problem = f"cannot be reached: {reason or error}"
-        raise ConnectionLost(problem, subject=protocol.subject_of(settings), action=start) from error
+        reason = f": {os.strerror(number) if number > 0 else error.strerror}" if number else ""
+        action = "Switch its computer on, check the network and its firewall, or correct controller.host"
+        if number == errno.ECONNREFUSED:
+            action = "Start LinuxCNC with DISPLAY = linuxcncrsh --port N, or correct controller.port"
+        problem = f"cannot be reached{reason or f' within {timeouts.connect:g} s'}"
+        raise ConnectionLost(problem, subject=protocol.subject_of(settings), action=action) from error

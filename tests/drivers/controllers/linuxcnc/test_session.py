@@ -2,6 +2,7 @@
 
 import asyncio
 import socket
+from unittest.mock import AsyncMock
 
 import pytest
 
@@ -77,15 +78,30 @@ async def test_opening_without_a_listening_server_is_reported():
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
         driver = LinuxcncrshController(ControllerSettings(config="x", port=port))
-        with pytest.raises(ConnectionLost, match=f"127.0.0.1:{port}: cannot be reached: Conn"):
+        with pytest.raises(
+            ConnectionLost, match=f"127.0.0.1:{port}: cannot be reached: Conn.*Start LinuxCNC"
+        ):
             await driver.open()
+
+
+NO_NAME, NO_ROUTE = socket.gaierror(-2, "Name or service not known"), OSError(113, "No route to host")
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [(NO_NAME, "Name or .*controller.host"), (NO_ROUTE, "No route to host. Switch its computer on")],
+)
+async def test_a_host_that_cannot_be_reached_is_not_told_as_linuxcnc_that_is_off(monkeypatch, error, told):
+    monkeypatch.setattr(asyncio, "open_connection", AsyncMock(side_effect=error))
+    with pytest.raises(ConnectionLost, match=f"cannot be reached: {told}"):
+        await LinuxcncrshController(ControllerSettings(config="x", host="far", port=5007)).open()
 
 
 async def test_opening_times_out_if_the_host_does_not_accept_the_connection(monkeypatch):
     monkeypatch.setattr(asyncio, "open_connection", lambda *_where: asyncio.Event().wait())
     settings = ControllerSettings(config="x", host="far", port=5007)
     driver = LinuxcncrshController(settings, timeouts=Timeouts(connect=0.01))
-    with pytest.raises(ConnectionLost, match=r"far:5007: cannot be reached within 0\.01 s"):
+    with pytest.raises(ConnectionLost, match=r"far:5007: cannot be reached within 0\.01 s.*its firewall"):
         await driver.open()
 
 
@@ -98,7 +114,7 @@ async def test_a_server_that_never_answers_the_greeting_is_reported(play):
 
 async def test_a_failed_opening_can_be_repeated_and_leaves_it_closed(play):
     driver = await play.driver([(HELLO, play.HANG_UP)], play.OPENING)
-    with pytest.raises(ConnectionLost):
+    with pytest.raises(ConnectionLost, match=r"takes no more clients .*without --sessions"):
         await driver.open()
     with pytest.raises(DeviceError, match="is not connected"):
         await pose_of(driver)

@@ -19,6 +19,7 @@ from hexacell.storage.atomic_files import os_error_to_file_error
 
 MAX_BYTES = 64
 SLOW = "State a longer timeout_s, or let no other program read"
+RIGHTS, OTHER = "Let this user read", "Name a file with millidegrees, not"
 PLAUSIBLE_C = (-100.0, 300.0)
 
 _log = logging.getLogger(__name__)
@@ -63,11 +64,12 @@ class SysfsThermometer:
             raise self._error(f"does not answer within {self._settings.timeout_s:g} s", SLOW) from None
         except OSError as error:
             plain = os_error_to_file_error("cannot be read", self._path, error)
-            raise self._error(plain.problem, "Connect it, or correct path") from error
+            check = RIGHTS if isinstance(error, PermissionError) else "Connect it, or correct path"
+            raise self._error(plain.problem, check) from error
         try:
             celsius = int(raw) / 1000
         except ValueError:
-            raise self._error(f"gives no number but {raw!r}") from None
+            raise self._error(f"gives no number but {raw!r}", OTHER if raw else SLOW) from None
         low, high = PLAUSIBLE_C
         if not low <= celsius <= high:
             raise self._error(f"gives {celsius:g} deg C, which is implausible")

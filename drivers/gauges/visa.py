@@ -73,10 +73,14 @@ class VisaPort(RequestPort):
             try:
                 self._resource = self._visa.ResourceManager(backend).open_resource(self.url)
             except Exception as error:  # its backends raise anything, also Exception itself
+                is_library = re.search("install|library|wrapper", str(error), re.IGNORECASE)
+                check = (
+                    "Install what it names, or correct backend" if is_library else "Check it, its rights"
+                )
                 raise PortLost(
                     f"port {self.url} cannot be opened: {error}",
                     subject=self.subject,
-                    action="Check the instrument and port in the cell file",
+                    action=f"{check} and port in the cell file",
                 ) from error
             self._opened()
             self._must_clear = False
@@ -128,7 +132,7 @@ class VisaGauge(SerialGauge):
     spec = ProtocolSpec("visa", "instrument with SCPI", LineSettings(9600), "+1.23450000E-03\n")
     probe = None
     terminator = b"\n"
-    silence_check = "line_end"
+    silence_check = "ask with its line_end"
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
         if settings.port is not None:

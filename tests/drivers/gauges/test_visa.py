@@ -6,6 +6,7 @@ import asyncio
 import sys
 from collections.abc import Mapping
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -77,7 +78,11 @@ async def test_another_instrument_voids_the_zero():
         (b"9.9E37\n", GaugeAtEnd, "gauge x: is out of its range"),
         (b"-9.90000000E+37\n", GaugeAtEnd, "gauge x: is out of its range"),
         (b"9.91E37\n", DeviceError, "gauge x: has no value"),
-        (b'-113,"Undefined header"\n', WrongAnswer, "where protocol visa has answers like"),
+        (
+            b'-113,"Undefined header"\n',
+            WrongAnswer,
+            "so it does not know the question. Correct protocol, or",
+        ),
         (b"+1.0E-03", WrongAnswer, "ends with nothing, where LF is expected"),
         (b"", GaugeSilent, "gauge x: does not answer within 0.5 s"),
     ],
@@ -95,6 +100,22 @@ async def test_what_is_no_value_is_told(answer, error, message):
 async def test_a_resource_that_is_not_there_is_told():
     settings = GaugeSettings(name="x", axis="x", protocol="visa", visa=SCPI, port="ASRL/dev/nowhere::INSTR")
     with pytest.raises(PortLost, match="gauge x: port /dev/nowhere is absent"):
+        await VisaGauge(settings, SharedSerialPorts()).open()
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (ValueError("Please install PyUSB to use this resource type."), "Install what it names"),
+        (OSError("Could not open VISA library"), "Install what it names, or correct backend"),
+        (PermissionError(13, "Access denied (insufficient permissions)"), "Check it, its rights"),
+    ],
+)
+async def test_why_a_resource_cannot_be_opened_decides_the_advice(monkeypatch, error, told):
+    library = pytest.importorskip("pyvisa")
+    monkeypatch.setattr(library, "ResourceManager", Mock(side_effect=error))
+    settings = GaugeSettings(name="x", axis="x", protocol="visa", visa=SCPI, port="USB::1::2::3::INSTR")
+    with pytest.raises(PortLost, match=told):
         await VisaGauge(settings, SharedSerialPorts()).open()
 
 

@@ -4,14 +4,17 @@ import os
 import threading
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
 from drivers import thermometers
 from drivers.interfaces import TemperatureReading
-from drivers.thermometers import SysfsThermometer
+from drivers.thermometers import OTHER, RIGHTS, SLOW, SysfsThermometer
 from hexacell.cell.devices import ThermometerSettings
 from hexacell.errors import DeviceError
+
+SENSOR = "Check the sensor behind"
 
 
 @pytest.fixture
@@ -45,21 +48,22 @@ async def test_millidegrees_are_read(path, room, text, celsius):
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "words", "check"),
     [
-        ("", "gives no number but ''"),  # a 1-wire sensor that is still measuring
-        ("NO\n", "gives no number but 'NO'"),
-        ("21.5\n", "gives no number but '21.5'"),
-        ("\xff\xfe", "gives no number"),
-        ("-2147483648\n", "gives -2.14748e[+]06 deg C"),
-        ("9" * 5000, "gives 1e[+]61 deg C|gives no number"),
+        ("", "gives no number but ''", SLOW),  # a 1-wire sensor that is still measuring
+        ("NO\n", "gives no number but 'NO'", OTHER),
+        ("21.5\n", "gives no number but '21.5'", OTHER),
+        ("\xff\xfe", "gives no number", OTHER),
+        ("-127000\n", "gives -127 deg C, which is implausible", SENSOR),
+        ("-2147483648\n", "gives -2.14748e[+]06 deg C", SENSOR),
+        ("9" * 5000, "gives 1e[+]61 deg C|gives no number", SENSOR),
     ],
 )
-async def test_contents_that_are_no_temperature_are_refused(path, room, text, words):
+async def test_contents_that_are_no_temperature_are_refused(path, room, text, words, check):
     show(path, text)
     with pytest.raises(DeviceError, match=f"^thermometer room: {words}") as refusal:
         await room.read()
-    assert refusal.value.action == f"Check the sensor behind {path}"
+    assert refusal.value.action == f"{check} {path}"
 
 
 async def test_an_unreadable_file_is_an_error_until_it_can_be_read(path, room):
@@ -67,6 +71,16 @@ async def test_an_unreadable_file_is_an_error_until_it_can_be_read(path, room):
         await room.open()
     show(path, "20000")
     assert (await room.read()).celsius == 20.0
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [(PermissionError(13, "denied"), f"{RIGHTS} "), (OSError(5, "I/O"), "Connect it, or correct path ")],
+)
+async def test_why_a_file_cannot_be_read_decides_the_advice(path, room, monkeypatch, error, told):
+    monkeypatch.setattr(os, "open", Mock(side_effect=error))
+    with pytest.raises(DeviceError, match=f"{told}{path}"):
+        await room.read()
 
 
 @pytest.mark.parametrize(

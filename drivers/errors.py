@@ -70,9 +70,9 @@ def invalid_sample(what: str, subject: str, action: str) -> InvalidSampleError:
     return InvalidSampleError(f"{what}; its position cannot be trusted", subject=subject, action=action)
 
 
-def silent_encoder(what: str, subject: str, check: str = "its supply and cable") -> SilentNodeError:
-    """The error for an encoder that does not answer; ``check`` is what may be the cause."""
-    action = f"Check {check}, then open the encoders again; the set that was being measured is void"
+def silent_encoder(what: str, subject: str, remedy: str) -> SilentNodeError:
+    """The error for an encoder that does not answer; ``remedy`` is what to do before it is opened again."""
+    action = f"{remedy}, then open the encoders again; the set that was being measured is void"
     return SilentNodeError(what, subject=subject, action=action)
 
 

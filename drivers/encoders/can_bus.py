@@ -39,8 +39,7 @@ ADVICE = {
     "(permission|access) denied": "Give this user the right to use it (docs/howto-host.md)",
     "busy|exclusively lock": "End the other program that uses it, or ModemManager (docs/howto-host.md)",
     "network is down": "Switch the CAN interface on (docs/howto-host.md)",
-    f"{NO_FRAME}|multiple access": "End other programs that read this port, and plug the adapter into a "
-    "USB port of its own",
+    f"{NO_FRAME}|multiple access": "End other programs that read this port; use a USB port of its own",
     "address family": "Load the kernel's modules for CAN: sudo modprobe -a can can_raw",
     "connection refused|timed out|unreachable": "Start the adapter's server, or correct channel in `bus`",
     "cannot import|library|is not defined": "Install its maker's library, or correct interface in `bus`",

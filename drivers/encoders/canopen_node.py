@@ -143,12 +143,12 @@ def duplicated_node(what: str, leg: Leg) -> DeviceError:
     )
 
 
-THE_BUS = "the CAN adapter, supply and termination"
+THE_NODE, THE_BUS = "Check its supply and cable", "Check the CAN adapter, supply and termination"
 
 
-def silent_nodes(what: str, legs: Sequence[Leg], check: str = "its supply and cable") -> SilentNodeError:
-    """The error for encoders that do not answer; ``check`` is what may be the cause."""
-    error = silent_encoder(what, subject_of(legs), check)
+def silent_nodes(what: str, legs: Sequence[Leg], remedy: str = THE_NODE) -> SilentNodeError:
+    """The error for encoders that do not answer; ``remedy`` as in ``silent_encoder``."""
+    error = silent_encoder(what, subject_of(legs), remedy)
     error.legs = frozenset(leg.number for leg in legs)
     return error
 
@@ -172,8 +172,8 @@ def explained(error: SilentNodeError, nodes: Sequence[EncoderNode], bus: Encoder
         return silent_nodes(what, silent, THE_BUS)
     if set(named) & set(silent):
         return silent_nodes(f"{error.problem}; the others answer", silent)
-    check = THE_BUS if len(named) == len(nodes) else f"its supply for a dip, and {error.waited_for}"
-    return silent_nodes(f"{error.problem}, but SDO requests are answered", named, check)
+    remedy = THE_BUS if len(named) == len(nodes) else f"Check its supply for a dip, and {error.waited_for}"
+    return silent_nodes(f"{error.problem}, but SDO requests are answered", named, remedy)
 
 
 SDO_REQUEST = 0x600

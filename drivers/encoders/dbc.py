@@ -157,7 +157,7 @@ class DbcSession(BankSession):
         self._frames = {signal.frame for signal in self._signals}
         super().__init__(settings, [signal.subject for signal in self._signals])
         self._latest: dict[int, _Received] = {}
-        self._hears_others = False
+        self._hears_others, self._incomplete = False, set[FrameId]()
         self.identities = tuple(
             DeviceIdentity(
                 f"encoder of leg {one.leg}",  # such encoders have no names of their own
@@ -206,6 +206,7 @@ class DbcSession(BankSession):
         except _cantools().Error as error:
             return _Received(now, 0.0, f"sends what the DBC file does not describe ({error})")
         if (value := values.get(signal.signal.name)) is None:
+            self._incomplete.add(signal.frame)
             return None
         low, high, problem = signal.signal.minimum, signal.signal.maximum, ""
         if (low is not None and value < low) or (high is not None and value > high):
@@ -240,11 +241,18 @@ class DbcSession(BankSession):
 
     def _silence(self, silent: list[PositionSignal]) -> SilentNodeError:
         what = f"sends nothing for {self._settings.timeout_s:g} s{self._bus.reported}"
+        subject = ", ".join(one.subject for one in silent)
+        if all(one.frame in self._incomplete for one in silent):
+            what = "sends its message, but not with this signal"
+            return silent_encoder(what, subject, "Correct signals in [encoders.dbc] (its multiplexer)")
         if len(silent) < len(self._signals):
-            check = "its supply and cable, and the message in the DBC file"
-            return silent_encoder(f"{what}; others do", ", ".join(one.subject for one in silent), check)
-        check = "the messages in the DBC file" if self._hears_others else f"{THE_BUS}, and the bit rate"
-        return silent_encoder(what + ", but others do" * self._hears_others, "each encoder", check)
+            remedy = "Check its supply and cable, and the message in the DBC file"
+            return silent_encoder(f"{what}; others do", subject, remedy)
+        remedy = (
+            "Check the messages in the DBC file" if self._hears_others else f"{THE_BUS}, and the bit rate"
+        )
+        remedy += ", and request in [encoders.dbc]" * (self._described.request is not None)
+        return silent_encoder(what + ", but others do" * self._hears_others, "each encoder", remedy)
 
     def _ask(self) -> float:
         """Send the request, if there is one; the time from which on frames have later positions."""

@@ -23,7 +23,7 @@ from hexacell.errors import UsageError
 
 LINE = {"baudrate": 19200, "bytesize": 8, "parity": "E", "stopbits": 1}
 DAMAGED_TRIES = 3
-ALL_SILENT = "the adapter, its supply and cable, and serial in [encoders.modbus]"
+ALL_SILENT = "Check the adapter, its supply and cable, and serial in [encoders.modbus]"
 MAX_REGISTERS = 125
 """Registers that one answer can have (Modbus Application Protocol 6.3)."""
 REGISTER_BITS, REGISTER_BYTES = 16, 2
@@ -99,7 +99,7 @@ class ModbusSession(BankSession):
         line = {**LINE, **described.serial, "settle_s": described.settle_s}
         self._port = ModbusPort(self._url, line, closing, trace)
         self._port.subject = "encoders"
-        self._answering: set[int] = set()
+        self._answering, self._has_sampled = set[int](), False
 
     def close(self) -> None:
         """Close the line."""
@@ -119,6 +119,7 @@ class ModbusSession(BankSession):
                 raise
             self._spans = register_spans(self._described, joined=False)
             self._sample()
+        self._has_sampled = True
         adapter = adapter_at(self._url)
         self.identities = tuple(  # such encoders have no names of their own
             DeviceIdentity(subject, "modbus", f"device {device}, register {register}", port=adapter)
@@ -136,12 +137,7 @@ class ModbusSession(BankSession):
                 return there
             back = self._read_all(spans[::-1])
         except PortLost as error:  # the line is the encoders' bus: a run opens them again
-            raise BusError(
-                error.problem,
-                subject="encoders",
-                action="Plug its adapter in and open the encoders again; the set that was being measured "
-                "is void",
-            ) from error
+            raise BusError(error.problem, subject="encoders", action=error.action) from error
         return tuple(round((one + other) / 2) for one, other in zip(there, back, strict=True))
 
     def _read_all(self, spans: Sequence[RegisterSpan]) -> tuple[int, ...]:
@@ -182,16 +178,16 @@ class ModbusSession(BankSession):
                 self._answering.add(span.device)
                 return answer
         what = f"does not answer within {self._settings.timeout_s:g} s"
-        check = "its supply and cable, and devices and serial in [encoders.modbus]"
+        remedy = "Check its supply and cable, and "
+        remedy += "timeout_s" if self._has_sampled else "devices and serial in [encoders.modbus]"
         if self._answering - {span.device}:
             what += f", while device {min(self._answering - {span.device})} on the same line does"
-            check = "its own supply, and devices in [encoders.modbus]"
+            remedy = "Check its own supply, and devices in [encoders.modbus]"
         if missing.received:
-            came, _ = wrong_frame(missing.beside_echo, span.device)
+            came, remedy = wrong_frame(missing.beside_echo, span.device)
             what = f"answers {came}, {DAMAGED_TRIES} times"
-            check = "its cable, devices and serial in [encoders.modbus]"
         self._answering.discard(span.device)
-        raise silent_encoder(what, span.subject, check)
+        raise silent_encoder(what, span.subject, remedy)
 
 
 class ModbusBank(ThreadedBank[ModbusSession]):

@@ -49,10 +49,10 @@ def detect_nodes(nodes: Sequence[EncoderNode], bus: EncoderBus, timeout_s: float
         bus.listen(SECOND_RESPONSE_S)
         unexpected = sorted(set(bus.network.scanner.nodes) - {node.leg.node for node in nodes})
         found = ", ".join(map(str, unexpected))
-        hint = "; others send" if bus.hears and len(missing) == len(nodes) else ""
+        is_alone = len(missing) == len(nodes) and not bus.hears
+        hint = "" if len(missing) < len(nodes) or is_alone else "; others send"
         hint = f"; node {found} is on the bus but belongs to no leg" if unexpected else hint
         odd = [node for node in missing if node.sdo.latest or node.leg.node in bus.network.scanner.nodes]
-        is_alone = len(missing) == len(nodes) and not bus.hears
         where = "the CAN adapter, supply, cable, termination, bit rate" if is_alone else "supply, cable"
         action = f"Check {where} and node id"
         if len(odd) == len(missing):

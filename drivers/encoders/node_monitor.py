@@ -39,34 +39,30 @@ _KNOWN_EMERGENCIES = {
     0x8130: "its heartbeat monitoring tripped",
     0x8240: "it expects another length of SYNC",
 }
-_RESTART = "Switch it off and on, then open the encoders again; if it stays so, replace it"
 _ACTIONS = {
     "2": "Check its cable for a short circuit, then measure again",
     "3": "Check the voltage of its supply at the encoder, then measure again",
     "4": "Let it cool, or warm up, and see what heats it; then measure again",
-    "5": _RESTART,
-    "6": _RESTART,
+    **dict.fromkeys("56", "Switch it off and on, then open the encoders again; if it stays so, replace it"),
     "8": "Open the encoders again; if it stays so, set the node with its vendor's tool",
     "81": "Check cable, termination and bit rate of the bus, then open the encoders again",
     "8130": "Open the encoders again; if it stays so, switch its heartbeat consumer (1016h) off",
     "8150": "Give each device on the bus a node id of its own, then open the encoders again",
-    "FF00": "Remove the cause (magnet, distance, dirt, temperature), then measure again",
-    "battery": "Change its battery, then open the encoders again",
-    "age": "It is old: replace it soon; until then open the encoders again",
-    "speed": "State a lower speed in [speed], then measure again",
+    **dict.fromkeys(
+        ("FF00", "m"), "Remove the cause (magnet, distance, dirt, temperature), then measure again"
+    ),
+    "b": "Change its battery, then open the encoders again",
+    "o": "It is old: replace it soon; until then open the encoders again",
+    "s": "State a lower speed in [speed], then measure again",
 }
 """By how the code of an emergency begins (CiA 301, table of error codes), and by what bits mean."""
-_BITS = {
-    ERROR_REGISTER: {1: "2", 2: "3", 3: "4"},
-    ALARMS: {0: "FF00"},
-    WARNINGS: {0: "speed", 1: "FF00", 2: "6", 3: "age", 4: "battery"},
-}
-"""What the bits of an entry mean (CiA 301, CiA 406); others are their makers'."""
+_BITS = {ERROR_REGISTER: "-234", ALARMS: "m", WARNINGS: "sm6ob"}
+"""What the bits of an entry mean, from the lowest (CiA 301, CiA 406); others are their makers'."""
 
 
 def advice_for(entry: ObjectEntry, value: int, code: str = "") -> str:
     """What to do, by the code of an emergency, or else by the lowest bit that has a known meaning."""
-    keys = [code, code[:2], code[:1], *(key for bit, key in _BITS[entry].items() if value >> bit & 1)]
+    keys = [code, code[:2], code[:1], *(key for bit, key in enumerate(_BITS[entry]) if value >> bit & 1)]
     unknown = "Look up what it means in the encoder's manual, and remove that; then measure again"
     return next((_ACTIONS[key] for key in keys if key in _ACTIONS), unknown)
 

@@ -123,7 +123,7 @@ class ModbusGauge(ValueOnlyGauge):
     """
 
     terminator = b""
-    port_factory = ModbusPort
+    port_factory, silence_check = ModbusPort, "device"
     probe = None
     spec = ProtocolSpec("modbus", "Modbus register", LineSettings(19200, parity="E"), "00 01 86 a0")
 

@@ -22,6 +22,7 @@ class IdHGauge(ValueOnlyGauge):
 
     spec = ProtocolSpec("mitutoyo-id-h", "Mitutoyo ID-H", LineSettings(9600), "GN01,+0016.2345\r\n", 5)
     has_channels = True
+    silence_check = "protocol, and channel, the number that is set in it,"
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
         super().__init__(settings, ports)

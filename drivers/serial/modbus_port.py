@@ -35,14 +35,19 @@ FRAME_BYTES, REGISTER_BYTES = 5, 2
 """Bytes of an answer without registers (device, function, length, checksum), and of each register."""
 
 EXCEPTIONS = {
-    1: "illegal function",
-    2: "illegal data address",
-    3: "illegal data value",
-    4: "device failure",
-    5: "acknowledged, takes long",
-    6: "device busy",
-    11: "no answer to the gateway",
+    "Correct device, kind and register in the cell file": {
+        1: "illegal function",
+        2: "illegal data address",
+        3: "illegal data value",
+    },
+    "Switch it off and on": {4: "device failure", 8: "memory parity error"},
+    "End other programs that ask it": {5: "acknowledged, takes long", 6: "device busy"},
+    "Check the device behind its gateway": {
+        10: "no path through the gateway",
+        11: "no answer to the gateway",
+    },
 }
+"""What a device answers in place of registers, by what to do (Modbus Application Protocol 7)."""
 NOT_THERE, BUSY = (2, 3), (5, 6)
 """Those that mean that there are no such registers, or not so many in one answer; those that pass."""
 LINE_KEYS = ("baudrate", "bytesize", "parity", "stopbits")
@@ -61,7 +66,7 @@ def wrong_frame(received: bytes, device: int) -> tuple[str, str]:
         return f"{what}: {quoted(received)}", "Set it to Modbus RTU, or correct port in the cell file"
     checksum = import_module("pymodbus.framer").FramerRTU.compute_CRC(received[:-2])
     if received[0] != device and checksum == int.from_bytes(received[-2:]):
-        action = "Correct device in the cell file, and give each device on the line its own"
+        action = "Correct device, or devices, in the cell file, and give each device on the line its own"
         return f"a frame of device {received[0]}, not {device}", action
     what = f"{quoted(received)}, no single frame with a right checksum"
     return what, f"Check {check}, and that no other device has its address"
@@ -116,10 +121,12 @@ class ModbusPort(RequestPort):
             self.closing.wait(PAUSE_S)
         if answer.isError():
             code = answer.exception_code
+            known = ((action, words[code]) for action, words in EXCEPTIONS.items() if code in words)
+            action, words = next(known, ("Switch it off and on", "of its maker"))
             refused = RefusedRequest(
-                f"device {device} answers exception {code} ({EXCEPTIONS.get(code, 'of its maker')})",
+                f"device {device} answers exception {code} ({words})",
                 subject=self.subject,
-                action="Correct device, kind and register in the cell file, or look it up in the manual",
+                action=f"{action}, or look it up in its manual",
             )
             refused.is_absence = code in NOT_THERE
             raise refused

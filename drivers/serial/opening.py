@@ -32,14 +32,12 @@ WITHOUT_WRITE_TIMEOUT = "rfc2217://"
 _ABSENT = ("is absent", "Plug it in or correct port in the cell file")
 _NOT_PERMITTED = ("may not be opened by this user", "Let the user into its group: docs/howto-host.md")
 _IN_USE = ("is in use", "Close the other program, or ModemManager: docs/howto-host.md")
+_NO_SERVER = ("has no server that answers", "Start it, check the network, or correct port in the cell file")
 _CAUSES = {
-    errno.ENOENT: _ABSENT,
-    errno.ENODEV: _ABSENT,
-    errno.ENXIO: _ABSENT,
-    errno.EACCES: _NOT_PERMITTED,
-    errno.EPERM: _NOT_PERMITTED,
-    errno.EBUSY: _IN_USE,
-    errno.EAGAIN: _IN_USE,
+    **dict.fromkeys((errno.ENOENT, errno.ENODEV, errno.ENXIO), _ABSENT),
+    **dict.fromkeys((errno.EACCES, errno.EPERM), _NOT_PERMITTED),
+    **dict.fromkeys((errno.EBUSY, errno.EAGAIN), _IN_USE),
+    **dict.fromkeys((errno.ECONNREFUSED, errno.EHOSTUNREACH, errno.ETIMEDOUT), _NO_SERVER),
     errno.EIO: ("cannot be opened: it has no device behind it", _ABSENT[1]),
     errno.ENOTTY: ("is no serial port, or has no control lines", "Correct port in the cell file"),
 }
@@ -115,12 +113,14 @@ def sent(write: Callable[[bytes], object], data: bytes) -> int:
 
 def lost_port(subject: str, url: str, reason: str, action: str = "Plug it in") -> PortLost:
     """The error for a port that was open, or should be."""
-    if "multiple access" in reason:  # pyserial's words
+    if "://" in url:
+        action = "Check the network, and that its server runs and serves no other client,"
+    elif "multiple access" in reason:  # pyserial's words
         action += ", end any other program that reads it,"
     return PortLost(
         f"port {url} was lost ({reason})",
         subject=subject,
-        action=f"{action} and open the device again; its zero is void",
+        action=f"{action} and open the device again; its zero, or the set that was being measured, is void",
     )
 
 

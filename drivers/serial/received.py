@@ -5,7 +5,7 @@ import re
 SHOWN_BYTES = 40
 BIT_7 = 0x80
 LINE_ENDS = {b"\r\n": "CR LF", b"\n": "LF", b"\r": "CR"}
-REFUSAL = re.compile(rb"(?i)\W*(err|\?|unknown|invalid|syntax|nak\b|\x15)|.*(unknown|invalid) command")
+REFUSAL = re.compile(rb'(?i)\W*(err|\?|unknown|invalid|syntax|nak\b|\x15|1..,")|.*(known|valid) command')
 TEXT = re.compile(rb"[\t\r\n -~]+")
 
 

@@ -53,6 +53,7 @@ CAUSES = [
     (DIGIMATIC, b"-1.234\r", "which ends with CR, where LF is expected"),
     (MUX, b"ERR\r", "so it does not know the question"),
     (ID_H, b"?\r", "so it does not know the question"),
+    (ID_H, b"", "channel, the number that is set in it"),
     (REQUEST, b'-113,"Undefined header", unknown command\r', "so it does not know the question"),
     (DIGIMATIC, b"\x15\n", "so it does not know the question"),
     (CDI, b"01A+0000.123\r", r"answers b'01A\+0000\.123\\r' where protocol cdi has .*Correct protocol"),
@@ -170,6 +171,7 @@ PORTS = [
     (termios.error(errno.EIO, "Input/output error"), "no device behind it"),
     (serial.SerialException(errno.EAGAIN, "Could not exclusively lock port"), "in use. Close the other"),
     (OSError(errno.EACCES, "Permission denied"), "may not be opened by this user"),
+    (OSError(errno.ECONNREFUSED, "refused"), "no server that answers. Start it, check the network"),
 ]
 
 
@@ -182,6 +184,9 @@ def test_why_a_port_cannot_be_opened_is_told(error, told):
 def test_a_port_that_another_program_reads_is_told():
     reason = "device reports readiness to read but returned no data (disconnected or multiple access?)"
     assert "any other program" in str(lost_port("gauge y", "/dev/ttyUSB0", reason))
+    assert "serves no other client" in str(
+        lost_port("gauge y", "socket://host:4001", "socket disconnected")
+    )
 
 
 def test_what_came_is_shown_in_part():

@@ -174,7 +174,7 @@ async def test_a_late_answer_is_not_that_of_the_next_request(simulated, monkeypa
         ("silent", SilentNodeError, r"encoders of legs 1, 2, 3 \(device 7\): does not answer within 0.5 s"),
         ("alarm", InvalidSampleError, "encoder of leg 3: shows -1, which means no valid position"),
         ("jumped", InvalidSampleError, "encoder of leg 3: jumped from 30.000 to 430.000 mm"),
-        ("unplugged", BusError, r"encoders: port .* was lost"),
+        ("unplugged", BusError, r"encoders: port .* was lost .*Plug it in and open .*is void"),
     ],
 )
 async def test_a_fault_names_the_leg_and_they_can_be_opened_again(simulated, fault, error, message):
@@ -226,11 +226,26 @@ async def test_a_busy_device_is_asked_again(simulated, monkeypatch):
     assert (await cell.driver.read()).positions == pytest.approx(ALL)
 
 
-@pytest.mark.parametrize(("code", "times"), [(4, 1), (6, 4), (11, 1), (77, 1)])
-async def test_other_exceptions_do_not_mean_absence(simulated, monkeypatch, code, times):
+OFF, ASKS, BEHIND = (
+    "Switch it off and on",
+    "End other programs that ask it",
+    "Check the device behind its gateway",
+)
+EXCEPTIONS = [
+    (1, 1, "Correct device, kind"),
+    (4, 1, OFF),
+    (5, 4, ASKS),
+    (6, 4, ASKS),
+    (8, 1, OFF),
+    (10, 1, BEHIND),
+]
+
+
+@pytest.mark.parametrize(("code", "times", "told"), [*EXCEPTIONS, (11, 1, BEHIND), (77, 1, OFF)])
+async def test_other_exceptions_do_not_mean_absence(simulated, monkeypatch, code, times, told):
     cell = simulated(registers=(0, 10, 20, 30, 40, 50))
     asked = refuse(monkeypatch, code)
-    with pytest.raises(RefusedRequest, match=rf"answers exception {code} .*look it up"):
+    with pytest.raises(RefusedRequest, match=rf"answers exception {code} .*{told}.*look it up"):
         await cell.driver.open()
     assert {command[2:6] for command in asked} == {bytes.fromhex("00 00 00 34")}
     assert len(asked) == times

@@ -41,7 +41,7 @@ class Commit(StepWithoutMotion):
         refused = [gate.sentence for gate in conditions if not gate.passed and not gate.needs_person]
         if refused:
             raise LimitError("the new geometry is refused: " + " ".join(refused))
-        change = ConfigChange.load(run.folder.proposal)
+        change = ConfigChange.load(run.folder.proposal).to_files(run.cell.config_paths)
         approved_by = await self._approval(run, state, change)
         cause = run.config.cause(WriteKind.RESULT, "its result, to be verified", by=approved_by)
         await run.config.apply(change, run.folder.path, cause)

@@ -8,6 +8,7 @@ imported, so that this is the namespace in which other packages name all of them
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self, Union
 
 from pydantic import Field
@@ -108,6 +109,11 @@ class RunStarted(BaseEvent):
     further_configs: tuple[str, ...] = ()
     corrections: Corrections = NO_CORRECTIONS
     holds: tuple[CorrectionKind, ...] = ()
+
+    @property
+    def config_paths(self) -> tuple[Path, ...]:
+        """All files of the config, where they were when it began."""
+        return (Path(self.config), *map(Path, self.further_configs))
 
     def applied_to(self, state: RunState) -> RunState:
         return replace(state, started=self, position_unknown=True)

@@ -77,9 +77,11 @@ def require_own_run(cell: Cell, folder: RunFolder, state: RunState, *, is_resume
         _require_no_links(path)
         if (path / RECEIPT).exists():
             _require_own_config(cell, path / RECEIPT, Receipt.of(path).paths)
-    if is_resumed and folder.proposal.exists():  # what applies it later names no file by it
-        _require_own_config(cell, folder.proposal, ConfigChange.load(folder.proposal).paths)
     assert state.started is not None  # noqa: S101 - a journal without a start is not resumed
+    if is_resumed and folder.proposal.exists():  # it names the config of the cell before that was copied
+        named = ConfigChange.load(folder.proposal).paths
+        if not are_same_files(named, state.started.config_paths):
+            _require_own_config(cell, folder.proposal, named)
     _require_own_geometry(cell, folder, state, state.started)
     _require_own_poses(cell, folder, state, state.started)
 

@@ -6,7 +6,6 @@ says of gates, geometry and text is computed again from the records before anyth
 
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 
 from hexacell.cell.loader import Cell, is_cell_file, load_cell
 from hexacell.config.change import ConfigChange
@@ -249,8 +248,7 @@ def _require_together(
     folder: RunFolder, started: events.RunStarted, proposed: events.Proposed, change: ConfigChange
 ) -> None:
     """The proposal is the one of the journal, and for the config that the run began with."""
-    files = tuple(Path(name) for name in (started.config, *started.further_configs))
-    is_same_config = are_same_files(change.paths, files)
+    is_same_config = are_same_files(change.paths, started.config_paths)
     is_same_text = change.sha256_before == started.config_sha256
     if (
         folder.proposal.is_symlink()

@@ -1,6 +1,7 @@
 """Small cells that are calibrated for real: simulated devices, real drivers, real files."""
 
 import asyncio
+import shutil
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -137,15 +138,14 @@ class Site:
         return [event for event in read_journal(self.folder.journal) if isinstance(event, kind)]
 
     def write(self, history: Sequence[events.Event], moved_from: Finished) -> None:
-        """A run folder in which all this has happened already, somewhere else."""
+        """A run folder in which all this has happened already, somewhere else: it names what is there."""
         self.folder.create(self.cell)
         with Journal(self.folder.journal) as journal:
             for event in history:
                 if isinstance(event, events.RunStarted):
                     event = event.model_copy(update={"cell_text": self.cell.text})  # noqa: PLW2901
                 journal.append(event)
-        moved = str(moved_from.cell.path.parent), str(self.cell.path.parent)
-        self.folder.proposal.write_text(moved_from.folder.proposal.read_text().replace(*moved))
+        shutil.copy(moved_from.folder.proposal, self.folder.proposal)
 
 
 @pytest.fixture

@@ -181,15 +181,6 @@ def test_a_fact_about_the_design_is_one_mistake(typed_here, tmp_path, case):
     assert re.search(r"\.toml(:\d+)?: ", outcome.err)
 
 
-def test_a_run_says_the_same(typed_here, tmp_path):
-    name, of_cell, of_config, words = CASES["branch"]
-    cell = written(tmp_path, name, of_cell, of_config)
-    for command in ("preflight", "run"):
-        outcome = typed_here(command, cell)
-        assert (outcome.code, outcome.err.count("\n")) == (2, 1), outcome.err
-        assert words[0] in outcome.err
-
-
 def test_small_tilts_of_a_task_are_no_radians(typed_here, tmp_path):
     tilts = with_columns(TILTS, lambda deg: np.round(deg / 40.0, 3))
     cell = written(tmp_path, PLATFORM, [in_rows("poses", tilts)])

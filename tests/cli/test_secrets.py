@@ -56,15 +56,6 @@ def test_show_and_validate_warn_and_show_no_password(typed_here, cell_folder):
         assert "hunter" not in outcome.out + outcome.err
 
 
-def test_validate_refuses_passwords_that_others_can_read(typed_here, cell_folder):
-    cell_folder.edit(("[controller]\n", '[controller]\npassword_file = "passwords.toml"\n'))
-    (cell_folder.path / "passwords.toml").write_text('enable_password = "hunter2"\n')
-    (cell_folder.path / "passwords.toml").chmod(0o644)
-    outcome = typed_here("cell", "validate", cell_folder.cell)
-    assert outcome.code == 2
-    assert "passwords.toml: others can read or change the passwords in it (mode 644)" in outcome.err
-
-
 def test_export_is_told_and_refuses_to_write_over_something(typed_here, demo, tmp_path):
     outcome = typed_here("replay", demo.run, "--export", tmp_path / "copy", "--json")
     assert outcome.code == 0

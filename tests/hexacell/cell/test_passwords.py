@@ -1,7 +1,5 @@
 """Where the controller's passwords come from, and who may read them."""
 
-from pathlib import Path
-
 import pytest
 
 from hexacell.cell.loader import Cell, describe, load_cell, settings_document
@@ -35,14 +33,11 @@ def test_without_any_they_are_those_that_linuxcnc_comes_with(cell_with) -> None:
     assert passwords_of(cell_with()) == ("EMC", "EMCTOO")
 
 
-def test_they_come_from_a_file_that_others_cannot_read(cell_with) -> None:
+def test_a_file_beside_the_cell_counts_and_the_environment_before_it(cell_with, monkeypatch) -> None:
+    monkeypatch.chdir("/")
     cell = cell_with('password_file = "passwords.toml"\n', PASSWORDS)
     assert passwords_of(cell) == ("hunter2", "hunter3")
     assert list(password_warnings(cell)) == []
-
-
-def test_the_environment_takes_precedence(cell_with) -> None:
-    cell = cell_with('password_file = "passwords.toml"\n', PASSWORDS)
     assert passwords_of(cell, HEXACELL_ENABLE_PASSWORD="other") == ("hunter2", "other")
 
 
@@ -112,8 +107,3 @@ def test_a_wrong_password_in_the_cell_file_is_not_quoted(cell_with) -> None:
         cell_with('connect_password = ["hunter2"]\n')
     assert "'connect_password' in [controller] must be text in quotes" in str(refused.value)
     assert "hunter" not in str(refused.value)
-
-
-def test_the_file_of_a_cell_is_relative_to_it(cell_with, tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.chdir("/")
-    assert passwords_of(cell_with('password_file = "passwords.toml"\n', PASSWORDS))[0] == "hunter2"

@@ -97,21 +97,6 @@ def test_each_instrument_may_have_its_own(load_noise) -> None:
     assert noise.encoders.tolist() == pytest.approx([0.02] * 6)
 
 
-@pytest.mark.parametrize(
-    ("line", "words"),
-    [
-        ("standstill_readings = 5", "5 standstill_readings are no series"),
-        ("standstill_readings = -1", "0 or more"),
-        ("averaged_windows = 0", "1 or more"),
-        ('figures = "guessed"', "'stated' or 'measured'"),
-        ("gauges_mm = [0.01, 0.0, 0.01]", "more than 0"),
-        ("encoders_mm = [0.01]", "6"),
-    ],
-)
-def test_mistakes_of_noise_are_named_with_their_line(refusal, cell_text, line_with, line, words) -> None:
-    refusal(cell_text.replace(STATED, f"{STATED}{line}\n", 1), words, line_with("[noise]"))
-
-
 def test_a_cell_states_its_own_escalations(load_with) -> None:
     cell = load_with('[recovery]\nagreement_mm = 0.02\n[recovery.unattended]\ndrift = ["abort"]\n')
     recovery = cell.settings.recovery
@@ -154,21 +139,6 @@ def test_settings_of_a_thermometer(load_text, cell_text) -> None:
     assert load_text(describe(cell)).settings == cell.settings
 
 
-@pytest.mark.parametrize(
-    ("section", "words"),
-    [
-        (ROOM + ROOM, "two thermometers have the same name"),
-        (ROOM.replace("path", "file"), "'path'"),
-        (ROOM.replace("room", ""), "text that is not empty"),
-        (ROOM + "legs = [7]\n", "legs"),
-        (ROOM + "legs = [4, 4]\n", "two thermometers are on the same leg"),
-        (ROOM + "legs = [4]\n" + ROOM.replace("room", "other") + "legs = [4]\n", "on the same leg"),
-    ],
-)
-def test_mistakes_are_reported_with_their_line(refusal, cell_text, section: str, words: str) -> None:
-    refusal(cell_text + section, words, len(cell_text.splitlines()) + 1)
-
-
 SECTION = '[uncertainty]\ngrade = "ideal"\n'
 SIZES = set(UncertaintySettings.model_fields) - {"grade", "sources", "stop_repeatability_acts"}
 
@@ -204,16 +174,38 @@ def test_a_size_replaces_that_of_the_grade_and_has_its_source(load_section) -> N
     assert sources == ["cell file", "certificate 7", "assumed: ordinary"]
 
 
-@pytest.mark.parametrize(
-    ("line", "words"),
-    [
-        ('grade = "superb"', "'precision', 'ordinary' or 'ideal'"),
-        ("grade = 3", "'precision', 'ordinary' or 'ideal'"),
-        ("load_n = -1.0", "0 or more"),
-        ("rail_wave_long_mm = 0.0", "more than 0"),
-        ('sources = {load = "drawing"}', "sources has load, which is no size"),
-        ("weight_n = 3.0", "unknown key"),
+MISTAKES = {
+    STATED: [
+        (f"{STATED}standstill_readings = 5\n", "5 standstill_readings are no series"),
+        (f"{STATED}standstill_readings = -1\n", "0 or more"),
+        (f"{STATED}averaged_windows = 0\n", "1 or more"),
+        (f'{STATED}figures = "guessed"\n', "'stated' or 'measured'"),
+        (f"{STATED}gauges_mm = [0.01, 0.0, 0.01]\n", "more than 0"),
+        (f"{STATED}encoders_mm = [0.01]\n", "6"),
     ],
-)
-def test_mistakes_are_named_with_their_line(refusal, cell_text, line_with, line, words) -> None:
-    refusal(cell_text.replace(SECTION, f"[uncertainty]\n{line}\n", 1), words, line_with("[uncertainty]"))
+    SECTION: [
+        ('[uncertainty]\ngrade = "superb"\n', "'precision', 'ordinary' or 'ideal'"),
+        ("[uncertainty]\ngrade = 3\n", "'precision', 'ordinary' or 'ideal'"),
+        ("[uncertainty]\nload_n = -1.0\n", "0 or more"),
+        ("[uncertainty]\nrail_wave_long_mm = 0.0\n", "more than 0"),
+        ('[uncertainty]\nsources = {load = "drawing"}\n', "sources has load, which is no size"),
+        ("[uncertainty]\nweight_n = 3.0\n", "unknown key"),
+    ],
+    "": [
+        (ROOM + ROOM, "two thermometers have the same name"),
+        (ROOM.replace("path", "file"), "'path'"),
+        (ROOM.replace("room", ""), "text that is not empty"),
+        (ROOM + "legs = [7]\n", "legs"),
+        (ROOM + "legs = [4, 4]\n", "two thermometers are on the same leg"),
+        (ROOM + "legs = [4]\n" + ROOM.replace("room", "other") + "legs = [4]\n", "on the same leg"),
+    ],
+}
+
+
+@pytest.mark.parametrize(("old", "more"), [(old, one) for old in MISTAKES for one in MISTAKES[old]])
+def test_mistakes_are_named_with_their_line(refusal, cell_text, old: str, more: tuple[str, str]) -> None:
+    """Some in the line of the section's head."""
+    new, words = more
+    text = cell_text.replace(old, new, 1) if old else cell_text + new
+    begin = cell_text.rindex("\n[", 0, cell_text.index(old) + 2) if old else len(cell_text)
+    refusal(text, words, cell_text[: begin + 1].count("\n") + 1)

@@ -10,8 +10,7 @@ import pytest
 import serial
 
 from drivers.encoders.can_bus import EncoderBus
-from drivers.errors import BusError, PortLost
-from drivers.serial.opening import opening_errors
+from drivers.errors import BusError
 from drivers.stop_input import CombinedStopInput
 from hexacell.errors import DeviceError, ExitCode, FileError
 from tests.drivers.serial.shared_port.conftest import LONG_S, FakePort, link_to, opened
@@ -110,22 +109,6 @@ async def test_an_absent_port_is_reported_with_the_gauge_and_an_action(links):
     text = "gauge x: port /dev/absent-port is absent. Plug it in or correct port in the cell file"
     assert str(caught.value) == text
     assert caught.value.exit_code is ExitCode.HARDWARE
-
-
-@pytest.mark.parametrize(
-    ("number", "words"),
-    [
-        (errno.ENOENT, "is absent"),
-        (errno.EACCES, "may not be opened by this user"),
-        (errno.EBUSY, "is in use"),
-        (errno.EAGAIN, "is in use"),
-        (errno.EIO, "cannot be opened"),
-    ],
-)
-def test_the_cause_is_reported_in_words(number, words):
-    with pytest.raises(PortLost, match=words) as caught, opening_errors("gauge x", "/dev/ttyUSB0"):
-        raise serial.SerialException(number, "reason")
-    assert caught.value.action
 
 
 async def test_a_port_in_use_is_reported():

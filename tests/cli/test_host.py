@@ -14,7 +14,7 @@ import pytest
 
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.errors import CellBusy, ExitCode
-from hexacell.run_process.client import LOST, HostConnection, HostNotStarted, connect_to_run, start_host
+from hexacell.run_process.client import HostConnection, HostNotStarted, connect_to_run, start_host
 from hexacell.run_process.host import STOPPED
 from hexacell.run_process.messages import EventRecorded, HostMessage, StatusChanged
 from hexacell.run_process.run_socket import socket_path
@@ -168,29 +168,6 @@ async def test_a_host_that_cannot_begin_says_why(cell, run) -> None:
     with pytest.raises(HostNotStarted, match=str(cell.path)) as refusal:
         await start_host(socket_path(cell), arguments(cell, run))
     assert refusal.value.exit_code is ExitCode.USAGE
-    await until(lambda: not hosts_of(cell))
-
-
-@pytest.mark.slow
-async def test_a_killed_host_is_missed_and_its_run_resumed(cell, run) -> None:
-    connection = await start_host(socket_path(cell), arguments(cell, run))
-    await until_told(connection, is_record)
-    (host,) = hosts_of(cell)
-    os.kill(host, signal.SIGKILL)
-    assert [one async for one in connection.messages()][-1] == LOST
-    assert socket_path(cell).exists(), "nobody could remove it"
-    before = read_journal(run.journal)
-    again = await start_host(socket_path(cell), [*arguments(cell, run), "--resume"])
-    told: list[events.Event] = []
-
-    def is_further_record(message: HostMessage) -> bool:
-        if isinstance(message, EventRecorded):
-            told.append(message.event)
-        return is_record(message) and len(told) > len(before)
-
-    await until_told(again, is_further_record)
-    assert told[: len(before)] == list(before)
-    await again.leave(keep_running=False)
     await until(lambda: not hosts_of(cell))
 
 

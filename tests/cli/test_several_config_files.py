@@ -98,25 +98,3 @@ def test_a_kill_between_the_two_is_undone_by_the_next_command(cell, run, typed_h
     assert "hexapod.hal got the old content back" in told.err
     assert found(cell) == before
     assert "interrupted" not in typed_here("status", cell.path).err
-
-
-@pytest.mark.slow
-def test_a_run_that_is_killed_between_the_two_is_resumed_by_one_command(typed, tmp_path) -> None:
-    folder = tmp_path / "cell"
-    folder.mkdir()
-    cell = hexapod_cell(
-        folder, ("orientations = 11", "orientations = 7"), ("position_mm = 0.3 ", "position_mm = 20.0 ")
-    )
-    before = found(cell)
-    arguments = ("run", cell.path, "--unattended", "--mode", "optimise")
-    kill_after(tmp_path, 1, *arguments)
-    assert [old == now for old, now in zip(before, found(cell), strict=True)] == [False, True]
-    resumed = typed(*arguments, "--resume", "--json")
-    assert resumed.code == 0, resumed.err
-    assert "hexapod.hal got the old content back" in resumed.err
-    assert resumed.document["verdict"] == "pass"
-    assert [old == now for old, now in zip(before, found(cell), strict=True)] == [False, False]
-    replayed = typed("replay", resumed.document["run"])
-    assert replayed.code == 0, replayed.err
-    undone = typed("rollback", cell.path)
-    assert (undone.code, found(cell)) == (0, before)

@@ -1,13 +1,11 @@
 """Runs that a scheduler starts: refused nights are explained, tried again, and ended in time."""
 
-import json
 import re
 import signal
 
 import pytest
 
 from hexacell.errors import ExitCode
-from hexacell.runs.cell_lock import cell_lock
 
 pytestmark = pytest.mark.usefixtures("few_candidates")
 
@@ -66,21 +64,6 @@ def test_a_person_at_the_machine_may_run_it_in_quiet_hours(typed_here, short_cel
     assert outcome.code == ExitCode.USAGE
     assert "no accepted result" in outcome.err
     assert typed_here("history", short_cell.cell, "--json").document["runs"] == []
-
-
-@pytest.mark.slow
-def test_a_busy_cell_is_tried_again_until_it_is_free(start, quick_cell) -> None:
-    stated(quick_cell, "window_minutes = 10\nretry_minutes = 0.02")
-    with cell_lock(quick_cell.controller):
-        process = start("run", quick_cell.cell, "--unattended", "--json")
-        process.wait_for("tried again in", lambda: process.err)
-    ended = process.ended()
-    assert ended.code in {ExitCode.DONE, ExitCode.OUT_OF_LIMITS}  # a check from the drawing decides either
-    [run] = [path for path in quick_cell.runs() if path.is_dir()]
-    assert str(run) == ended.document["run"]
-    tries = json.loads((run / "not-begun.json").read_text())["attempts"]
-    assert {one["exit_code"] for one in tries} == {ExitCode.BUSY}
-    assert (run / "journal.jsonl").is_file()
 
 
 def test_a_signal_ends_the_waiting(start, short_cell) -> None:

@@ -203,22 +203,13 @@ class Cutter:
 
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
-def test_a_kill_at_any_call_of_a_write_back_or_rollback_leaves_a_valid_config(
-    program: Any, new_site: Any, rolled_back: Any
+@pytest.mark.parametrize(("to", "back"), [("committing", "rolling back"), ("lending", "taking back")])
+def test_a_kill_at_any_call_of_a_write_or_its_reversal_leaves_a_valid_config(
+    program: Any, new_site: Any, whole_with: Any, to: str, back: str
 ) -> None:
-    cutter = Cutter(program, new_site, rolled_back)
-    committing, rolling_back = writes_of_the_config(rolled_back.ended.calls)
-    require_cut_everywhere(cutter, committing, "committing", rolling_back, "rolling back")
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(3600)
-def test_a_kill_at_any_call_of_a_provisional_write_or_its_reversal_leaves_a_valid_config(
-    program: Any, new_site: Any, lent: Any
-) -> None:
-    cutter = Cutter(program, new_site, lent)
-    lending, taking_back, _ = writes_of_the_config(lent.ended.calls)
-    require_cut_everywhere(cutter, lending, "lending", taking_back, "taking back")
+    whole = whole_with(back)
+    there, back_again, *_ = writes_of_the_config(whole.ended.calls)
+    require_cut_everywhere(Cutter(program, new_site, whole), there, to, back_again, back)
 
 
 def require_cut_everywhere(cutter: Cutter, there: range, to: str, back_again: range, back: str) -> None:

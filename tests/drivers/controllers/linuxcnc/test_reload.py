@@ -94,11 +94,27 @@ async def test_a_joint_that_moved_is_an_error(play):
         await driver.reload(RESTARTED)
 
 
-async def test_an_emergency_stop_meanwhile_is_not_reset(play):
+@pytest.mark.parametrize(
+    ("conversations", "settings", "permitted", "told"),
+    [
+        ([[*BEFORE, *TURNED_OFF, *wire.IN_ESTOP, *wire.HOMED]], {}, RESTARTED, "is in emergency stop"),
+        ([[*wire.IS_OFF, *TURNED_OFF, *wire.OFF]], {}, RESTARTED, "is switched off"),
+        (
+            [RESTARTING, [*REOPENED, *RESTARTS]],
+            COMMAND,
+            frozenset({StartupAction.HOME}),
+            "since it was started",
+        ),
+    ],
+    ids=["stopped meanwhile", "off before", "restarted"],
+)
+async def test_nothing_is_reset_or_switched_on_without_permission(
+    play, conversations, settings, permitted, told
+):
     play.patience = play.IMPATIENT
-    driver = await play.opened([*BEFORE, *TURNED_OFF, *wire.IN_ESTOP, *wire.HOMED])
-    with pytest.raises(StartupNotPermitted, match="is in emergency stop"):
-        await driver.reload(RESTARTED)
+    driver = await play.opened(*conversations, **settings)
+    with pytest.raises(StartupNotPermitted, match=told):
+        await driver.reload(permitted)
 
 
 async def test_after_an_emergency_stop_meanwhile_the_machine_is_not_switched_on_without_permission(play):
@@ -108,18 +124,6 @@ async def test_after_an_emergency_stop_meanwhile_the_machine_is_not_switched_on_
         await driver.reload(RESTARTED)
     with pytest.raises(StartupNotPermitted, match="is switched off"):
         await driver.prepare(RESTARTED)
-
-
-async def test_a_machine_that_was_off_is_not_switched_on_without_permission(play):
-    driver = await play.opened([*wire.IS_OFF, *TURNED_OFF, *wire.OFF])
-    with pytest.raises(StartupNotPermitted, match="is switched off"):
-        await driver.reload(RESTARTED)
-
-
-async def test_a_restarted_controller_is_left_in_emergency_stop_without_permission(play):
-    driver = await play.opened(RESTARTING, [*REOPENED, *RESTARTS], **COMMAND)
-    with pytest.raises(StartupNotPermitted, match="since it was started"):
-        await driver.reload(frozenset({StartupAction.HOME}))
 
 
 async def test_a_controller_that_does_not_restart_is_reported(play):

@@ -155,14 +155,11 @@ def test_pins_before_one_that_halcmd_cannot_set_get_their_old_numbers_again(pins
 
 
 def test_a_call_that_would_set_nothing_fails(pins, files) -> None:
-    """The file with the geometry was forgotten: the controller would go on with its old one."""
-    with pytest.raises(UsageError, match="set no pin to a number"):
-        set_pins(files(hal="setp kins.l.0 [KINS]L1\n")[:1])
-
-
-def test_without_a_hal_file_it_says_how_it_is_called(pins, files) -> None:
-    with pytest.raises(UsageError, match="no HAL file is named"):
-        set_pins(files()[1:])
+    """A file with the geometry was forgotten: the controller would go on with its old one."""
+    hal, ini = files(hal="setp kins.l.0 [KINS]L1\n")
+    for named, words in (([hal], "set no pin to a number"), ([ini], "no HAL file is named")):
+        with pytest.raises(UsageError, match=words):
+            set_pins(named)
 
 
 def test_without_linuxcnc_the_command_fails_in_one_line(files, monkeypatch, capsys) -> None:

@@ -146,26 +146,21 @@ async def test_the_status_is_not_read_during_a_stop(play) -> None:
     assert await looking == ON
 
 
-async def test_a_stop_during_a_move_is_reported_by_the_move(play) -> None:
-    """The move raises its own error; the guards need no second stop."""
+@pytest.mark.parametrize(
+    ("answer", "then", "told"),
+    [
+        (wire.ACK, [("get abs_act_pos", wire.HALF_WAY)], "it was stopped on request"),
+        (wire.NAK, wire.said("get enable: OFF"), "was stopped before it moved"),
+    ],
+)
+async def test_a_stop_during_a_move_is_reported_by_the_move(play, answer, then, told) -> None:
+    """The move raises its own error, also where it is refused; the guards need no second stop."""
     stopped = play.Pause()
-    main = [(wire.MDI, stopped, wire.ACK), ("get abs_act_pos", wire.HALF_WAY)]
+    main = [(wire.MDI, stopped, answer), *then]
     driver = await play.opened(main, [*LOOKING_ON, *asked(), wire.AGAIN_IN_CONTROL, *play.STOPPED])
     await driver.status()
     moving = await stopped.reached_by(driver.move(wire.TARGET, wire.MOVE_S))
     await driver.stop()
     stopped.set()
-    with pytest.raises(MotionInterrupted, match="it was stopped on request"):
-        await moving
-
-
-async def test_a_move_that_is_refused_because_a_stop_took_control_was_stopped(play) -> None:
-    received = play.Pause()
-    main = [(wire.MDI, received, wire.NAK), *wire.said("get enable: OFF")]
-    driver = await play.opened(main, [*LOOKING_ON, *asked(), wire.AGAIN_IN_CONTROL, *play.STOPPED])
-    await driver.status()
-    moving = await received.reached_by(driver.move(wire.TARGET, wire.MOVE_S))
-    await driver.stop()
-    received.set()
-    with pytest.raises(MotionInterrupted, match="was stopped before it moved"):
+    with pytest.raises(MotionInterrupted, match=told):
         await moving

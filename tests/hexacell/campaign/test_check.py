@@ -1,6 +1,5 @@
 """Checks of robots that were calibrated, and of one that was not, without hardware."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -14,24 +13,15 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.uncertainty.effect_kinds import common_encoder_scale, encoder_scales
 from hexacell.verdict.check_statement import CheckStatement
 from hexacell.verdict.decision import Verdict
-from tests.hexacell.campaign.conftest import TWO_POINTS, check_of, measured_by
+from tests.hexacell.campaign.conftest import TWO_POINTS, check_of, make, measured_by
+from tests.hexacell.conftest import ACTUAL
 
-MakeCheck = Callable[..., Check]
+QUICK = {"identification__points": TWO_POINTS, "noise__encoder": 0.002, "noise__gauge_mm": 0.002}
 
 
-@pytest.fixture(scope="module")
-def make_check(make_plan, paper) -> MakeCheck:
+def make_check(*, calibrated: bool = True, budget: int = 40, **changes: Any) -> Check:
     """A check of the paper's robot, whose controller has its true geometry, with quick readings."""
-
-    def make(*, calibrated: bool = True, budget: int = 40, **changes: Any) -> Check:
-        changes = {
-            "identification__points": TWO_POINTS,
-            "noise__encoder": 0.002,
-            "noise__gauge_mm": 0.002,
-        } | changes
-        return check_of(make_plan(**changes), paper.actual, 0.005 if calibrated else None, budget=budget)
-
-    return make
+    return check_of(make(**QUICK | changes), ACTUAL, 0.005 if calibrated else None, budget=budget)
 
 
 def carried_out(check: Check, truth: Geometry, seed: int = 1) -> CampaignState:
@@ -50,7 +40,7 @@ def said(check: Check, measurements: MeasurementSet) -> CheckStatement:
 
 
 @pytest.fixture(scope="module")
-def unchanged(make_check) -> tuple[Check, CampaignState]:
+def unchanged() -> tuple[Check, CampaignState]:
     check = make_check()
     return check, carried_out(check, check.robot.commanding)
 
@@ -76,7 +66,7 @@ def test_a_check_measures_at_two_points_at_least(unchanged) -> None:
     assert check.reached(state.measurements) is not None
 
 
-def test_a_robot_that_was_hit_fails(make_check) -> None:
+def test_a_robot_that_was_hit_fails() -> None:
     check = make_check()
     state = carried_out(check, changed(check, 0.4 * np.random.default_rng(3).standard_normal(35)))
     stated = said(check, state.measurements)
@@ -85,7 +75,7 @@ def test_a_robot_that_was_hit_fails(make_check) -> None:
     assert stated.drift_scale >= 10.0
 
 
-def test_without_enough_records_it_is_not_evaluated_and_says_how_many_would_do(make_check) -> None:
+def test_without_enough_records_it_is_not_evaluated_and_says_how_many_would_do() -> None:
     check = make_check(noise__encoder=0.01, noise__gauge_mm=0.01, budget=6)
     state = carried_out(check, check.robot.commanding)
     stated = said(check, state.measurements)
@@ -103,7 +93,7 @@ def test_readings_that_no_drift_explains_are_not_evaluated(unchanged) -> None:
     assert stated.verdict in {Verdict.NOT_EVALUATED, Verdict.FAIL}
 
 
-def test_without_a_result_a_robot_as_drawn_is_checked_from_its_tolerances(make_check, paper) -> None:
+def test_without_a_result_a_robot_as_drawn_is_checked_from_its_tolerances(paper) -> None:
     check = make_check(calibrated=False, budget=16)
     truth = check.robot.mechanism.normalize_frames(paper.actual)[0]
     stated = said(check, carried_out(check, truth).measurements)

@@ -11,6 +11,7 @@ from hexacell.errors import LimitError
 from hexacell.identification.estimator import estimate_online
 from hexacell.measurements.records import MeasurementSet
 from tests.hexacell.altered_records import altered
+from tests.hexacell.conftest import problem_of
 
 FALSE = (2, 5)
 OTHERS = (1, 3)
@@ -30,25 +31,20 @@ def with_change(measurements, label, change):
     )
 
 
-@pytest.fixture
-def chain(make_problem):
+def chain(measurements, tries_others=True):
     """All estimates of the chain, that of the first record first."""
-
-    def estimates(measurements, tries_others=True):
-        last, every = None, []
-        for count in range(1, len(measurements) + 1):
-            problem = make_problem(MeasurementSet(measurements.records[:count]))
-            last = update_estimate(problem, last, tries_others)
-            every.append(last)
-        return every
-
-    return estimates
+    last, every = None, []
+    for count in range(1, len(measurements) + 1):
+        problem = problem_of(MeasurementSet(measurements.records[:count]))
+        last = update_estimate(problem, last, tries_others)
+        every.append(last)
+    return every
 
 
 @pytest.mark.sample("label1")
 @pytest.mark.parametrize("label", [FALSE, OTHERS, (2, 1), (3, 2)])
 def test_a_false_record_is_left_out_once_the_others_prove_it_and_changes_nothing(
-    noisy, chain, make_problem, label
+    noisy, make_problem, label
 ):
     every = chain(with_change(noisy, label, one_mm_more))
     first = next(number for number, one in enumerate(every) if one.false_records)
@@ -67,11 +63,11 @@ def test_a_false_record_is_left_out_once_the_others_prove_it_and_changes_nothing
     assert np.abs((last.identification.free - without.free) / sigma).max() < 1e-2
 
 
-def test_no_record_of_good_ones_is_left_out(noisy, chain):
+def test_no_record_of_good_ones_is_left_out(noisy):
     assert not any(one.false_records for one in chain(noisy))
 
 
-def test_a_robot_near_its_prior_keeps_all_records(noisy, chain):
+def test_a_robot_near_its_prior_keeps_all_records(noisy):
     spoilt = with_change(noisy, FALSE, one_mm_more)
     last = chain(spoilt, tries_others=False)[-1]
     assert last.identification.records == len(noisy)

@@ -26,13 +26,8 @@ def at_both_points(taken):
     return tuple(tuple(r.pose for r in records if r.point == point) for point in (1, 2))
 
 
-@pytest.fixture
-def plan_of():
-    def of(poses, **changes):
-        listed = PoseList(Path("list.csv"), poses)
-        return at_two_points(listed=listed, **changes)
-
-    return of
+def plan_of(poses, **changes):
+    return at_two_points(listed=PoseList(Path("list.csv"), poses), **changes)
 
 
 def poses_of(taken, point):
@@ -43,7 +38,7 @@ def poses_of(taken, point):
     ]
 
 
-def test_a_list_that_is_safe_is_visited_in_its_order(plan_of, visited, carry_out):
+def test_a_list_that_is_safe_is_visited_in_its_order(visited, carry_out):
     taken = carry_out(plan_of(visited))
     assert len(taken[-1].state.measurements) >= 15
     for point in (1, 2):
@@ -54,7 +49,7 @@ def test_a_list_that_is_safe_is_visited_in_its_order(plan_of, visited, carry_out
     assert isinstance(taken[-1].decision, Finished)
 
 
-def test_a_pose_that_is_not_safe_yet_is_postponed(plan_of, visited, carry_out):
+def test_a_pose_that_is_not_safe_yet_is_postponed(visited, carry_out):
     """The widest pose listed first comes later, when enough is known."""
     reference, *others = visited[0]
     backwards = ((reference, *reversed(others)), visited[1])
@@ -64,7 +59,7 @@ def test_a_pose_that_is_not_safe_yet_is_postponed(plan_of, visited, carry_out):
     assert not _near(there[1], others[-1])
 
 
-def test_a_rejected_pose_is_skipped(plan_of, campaign, visited):
+def test_a_rejected_pose_is_skipped(campaign, visited):
     plan = plan_of(visited)
     state = campaign[6].state
     first = plan.decide(state)
@@ -76,7 +71,7 @@ def test_a_rejected_pose_is_skipped(plan_of, campaign, visited):
     assert isinstance(given_up, FinishPoint)
 
 
-def test_poses_beyond_the_travel_are_never_visited(plan_of, visited, carry_out):
+def test_poses_beyond_the_travel_are_never_visited(visited, carry_out):
     steep = tuple(Pose(*TWO_POINTS[0], tilt, 0.0, 0.0) for tilt in (0.0, 30.0, -30.0))
     plan = plan_of((steep, steep))
     taken = carry_out(plan)
@@ -84,7 +79,7 @@ def test_poses_beyond_the_travel_are_never_visited(plan_of, visited, carry_out):
     assert "none of the poses left in the list" in closed.reason
 
 
-def test_the_first_pose_of_a_point_is_its_reference(plan_of, visited):
+def test_the_first_pose_of_a_point_is_its_reference(visited):
     moved = (Pose(101.0, -99.0, 501.0, 1.0), *visited[0][1:])
     opening = plan_of((moved, visited[1])).decide(CampaignState())
     assert isinstance(opening, StartPoint)

@@ -1,6 +1,5 @@
 """The quick level of a robot that drifted, without hardware."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -12,20 +11,15 @@ from hexacell.dry_run.campaign import try_quick_level
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.mechanism import free_parameter_derivatives
 from hexacell.measurements.records import MeasurementSet
-from tests.hexacell.campaign.conftest import check_of, measured_by
+from tests.hexacell.campaign.conftest import check_of, make, measured_by
+from tests.hexacell.conftest import ACTUAL
 
 DRIFT_MM = 0.05
-MakeQuick = Callable[..., QuickLevel]
 
 
-@pytest.fixture(scope="module")
-def make_quick(make_plan, paper) -> MakeQuick:
-    def make(*, budget: int = 24, calibrated_mm: float = 0.02) -> QuickLevel:
-        plan = make_plan(noise__encoder=0.002, noise__gauge_mm=0.002)
-        check = check_of(plan, paper.actual, calibrated_mm, budget=budget, drift_mm=DRIFT_MM)
-        return QuickLevel(check, budget)
-
-    return make
+def make_quick(*, budget: int = 24, calibrated_mm: float = 0.02) -> QuickLevel:
+    plan = make(noise__encoder=0.002, noise__gauge_mm=0.002)
+    return QuickLevel(check_of(plan, ACTUAL, calibrated_mm, budget=budget, drift_mm=DRIFT_MM), budget)
 
 
 def carried_out(quick: QuickLevel) -> tuple[CampaignState, np.ndarray]:
@@ -39,7 +33,7 @@ def carried_out(quick: QuickLevel) -> tuple[CampaignState, np.ndarray]:
 
 
 @pytest.fixture(scope="module")
-def measured(make_quick) -> tuple[QuickLevel, CampaignState, np.ndarray]:
+def measured() -> tuple[QuickLevel, CampaignState, np.ndarray]:
     quick = make_quick()
     return quick, *carried_out(quick)
 
@@ -54,7 +48,7 @@ def test_the_budget_is_kept_and_said(measured) -> None:
     assert said.calibrated_mm == quick.calibrated_mm
 
 
-def test_it_ends_when_the_robot_is_known_as_well_as_before(make_quick) -> None:
+def test_it_ends_when_the_robot_is_known_as_well_as_before() -> None:
     """The larger the errors that the calibration left, the fewer records are as good."""
     quick = make_quick(budget=60, calibrated_mm=0.3)
     state, _ = carried_out(quick)
@@ -89,7 +83,7 @@ def test_parameters_are_undetermined_by_the_drawing_and_not_by_the_last_result(m
     assert identify(known.problem(state.measurements)).undetermined != ()
 
 
-def test_a_trial_predicts_what_a_run_gives(make_quick, measured) -> None:
+def test_a_trial_predicts_what_a_run_gives(measured) -> None:
     _, state, _ = measured
     tried = try_quick_level(make_quick())
     assert tried.accuracy is not None

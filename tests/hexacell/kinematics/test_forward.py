@@ -118,21 +118,19 @@ def test_empty_batches(hexaglide, paper):
     assert singularity_margin(hexaglide, paper.actual, nothing, none).shape == (0,)
 
 
+def found_either_way(mechanism, geometry, joints, near, starts, start_joints):
+    """By the pose they are near to, and by a path from others that close."""
+    yield forward_kinematics(mechanism, geometry, joints, near)
+    start = {"start": starts, "start_geometry": geometry, "start_joints": start_joints}
+    yield continue_solution(mechanism, geometry, joints, **start)
+
+
 def test_joints_without_a_solution_do_not_affect_other_poses(hexaglide, paper, inverse):
     at = PoseBatch.of([Pose(0, 0, 550, 5), Pose(10, 20, 560), Pose(0, 0, 540)])
     joints = inverse(paper.nominal, at)
     joints[1] += [-300, -300, -300, 300, 300, 300]
-    for found in (
-        forward_kinematics(hexaglide, paper.nominal, joints, nudged(Pose(0, 0, 550), [0.1] * 6)[[0, 0, 0]]),
-        continue_solution(
-            hexaglide,
-            paper.nominal,
-            joints,
-            start=at,
-            start_geometry=paper.nominal,
-            start_joints=inverse(paper.nominal, at),
-        ),
-    ):
+    near = nudged(Pose(0, 0, 550), [0.1] * 6)[[0, 0, 0]]
+    for found in found_either_way(hexaglide, paper.nominal, joints, near, at, inverse(paper.nominal, at)):
         np.testing.assert_array_equal(found.found, [True, False, True])
         np.testing.assert_allclose(found.poses.positions[[0, 2]], at.positions[[0, 2]], atol=1e-8)
 
@@ -148,17 +146,8 @@ def test_solutions_beyond_a_singularity_are_not_found(hexaglide, paper, inverse,
     side = np.sign(
         np.linalg.det(numeric_jacobian(hexaglide, paper.nominal, here, inverse(paper.nominal, here)))
     )
-    for found in (
-        forward_kinematics(hexaglide, paper.nominal, joints, starts),
-        continue_solution(
-            hexaglide,
-            paper.nominal,
-            joints,
-            start=starts,
-            start_geometry=paper.nominal,
-            start_joints=inverse(paper.nominal, starts),
-        ),
-    ):
+    at_start = inverse(paper.nominal, starts)
+    for found in found_either_way(hexaglide, paper.nominal, joints, starts, starts, at_start):
         rows = np.flatnonzero(found.found)
         assert len(rows) >= 10
         for row in rows.tolist():

@@ -20,11 +20,8 @@ def visits(*rows):
     )
 
 
-def test_without_a_second_visit_there_is_no_repeatability():
+def test_without_a_second_visit_at_the_same_point_there_is_no_repeatability():
     assert repeatability(visits((1, 1, 0.0, (0, 0, 0)), (1, 2, 5.0, (1, 2, 3)))) is None
-
-
-def test_the_same_command_at_another_point_is_not_the_same_visit():
     assert repeatability(visits((1, 1, 5.0, (0, 0, 0)), (2, 1, 5.0, (1, 2, 3)))) is None
 
 

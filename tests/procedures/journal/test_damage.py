@@ -66,10 +66,21 @@ def test_any_bytes_after_the_last_record_are_one_torn_line(path: Path, written: 
     assert read_journal(path) == TOLD
 
 
-@pytest.mark.parametrize("tail", [b"\n\n", b"ab\ncd", b"ab\ncd\n"])
-def test_two_damaged_lines_are_more_than_a_torn_tail(path: Path, written: bytes, tail: bytes) -> None:
-    path.write_bytes(written + tail)
-    with pytest.raises(FileError, match=r":5: .*damaged"):
+NO_RECORDS = (b"[]", b"3", b'"text"', b"null", b"{}", b'{"n": 1}', b"\xff\xfe")
+
+
+@pytest.mark.parametrize(
+    ("head", "tail", "line"),
+    [
+        *((b"", tail, 5) for tail in (b"\n\n", b"ab\ncd", b"ab\ncd\n")),
+        *((one + b"\n", b"", 1) for one in NO_RECORDS),
+    ],
+)
+def test_two_damaged_lines_or_one_in_front_are_more_than_a_torn_tail(
+    path, written, head, tail, line
+) -> None:
+    path.write_bytes(head + written + tail)
+    with pytest.raises(FileError, match=rf":{line}: .*damaged"):
         read_journal(path)
 
 
@@ -102,13 +113,6 @@ def test_lines_left_out_exchanged_or_twice_are_damage(path: Path, written: bytes
     lines = written.splitlines(keepends=True)
     path.write_bytes(b"".join(lines[place] for place in order))
     with pytest.raises(FileError, match="damaged"):
-        read_journal(path)
-
-
-@pytest.mark.parametrize("line", [b"[]", b"3", b'"text"', b"null", b"{}", b'{"n": 1}', b"\xff\xfe"])
-def test_lines_that_are_no_records_are_damage(path: Path, written: bytes, line: bytes) -> None:
-    path.write_bytes(line + b"\n" + written)
-    with pytest.raises(FileError, match=":1: "):
         read_journal(path)
 
 

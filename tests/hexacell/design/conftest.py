@@ -15,6 +15,7 @@ from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.rotations import Array
 from hexacell.limits.limits import Limits
 from hexacell.measurements.records import MeasurementSet
+from tests.hexacell.conftest import BRANCH, NOMINAL
 
 NOISE = Noise(0.01, 0.01)
 LIMITS = Limits(
@@ -31,23 +32,23 @@ def limits() -> Limits:
     return LIMITS
 
 
-@pytest.fixture(scope="session")
-def know(paper: Any) -> Callable[..., RobotBelief]:
+def known(
+    estimate: Identification | Geometry,
+    sigma_mm: float = 0.0,
+    limits: Limits = LIMITS,
+    controller: Geometry = NOMINAL,
+) -> RobotBelief:
     """Knowledge by an estimate, or by a geometry and how surely (mm) it is known."""
+    if isinstance(estimate, Geometry):
+        free = Hexaglide.convention.free_parameters(estimate)
+        covariance: Array = sigma_mm**2 * np.eye(len(free))
+    else:
+        free, covariance = estimate.free, estimate.free_covariance
+    return RobotBelief(Hexaglide(), controller, BRANCH, free, covariance, NOISE, limits)
 
-    def known(
-        estimate: Identification | Geometry,
-        sigma_mm: float = 0.0,
-        limits: Limits = LIMITS,
-        controller: Geometry = paper.nominal,
-    ) -> RobotBelief:
-        if isinstance(estimate, Geometry):
-            free = Hexaglide.convention.free_parameters(estimate)
-            covariance: Array = sigma_mm**2 * np.eye(len(free))
-        else:
-            free, covariance = estimate.free, estimate.free_covariance
-        return RobotBelief(Hexaglide(), controller, paper.branch, free, covariance, NOISE, limits)
 
+@pytest.fixture(scope="session")
+def know() -> Callable[..., RobotBelief]:
     return known
 
 

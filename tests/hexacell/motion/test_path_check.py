@@ -12,20 +12,17 @@ from hexacell.limits.leg_limits import LegLimits
 from hexacell.limits.limits import AxisLimits
 from hexacell.motion.path_check import LinesFrom, is_clear
 from hexacell.motion.trajectory import PIECES, interpolate_line
+from tests.hexacell.conftest import NOMINAL
+from tests.hexacell.design.conftest import LIMITS, known
 
 
 def at(*numbers: float) -> PoseBatch:
     return PoseBatch.of([Pose(*numbers)])
 
 
-@pytest.fixture(scope="module")
-def exactly(know, paper, limits):
+def exactly(**change):
     """A robot as drawn, and known exactly."""
-
-    def known(**change):
-        return know(paper.nominal, limits=replace(limits, **change))
-
-    return known
+    return known(NOMINAL, limits=replace(LIMITS, **change))
 
 
 def test_all_six_numbers_are_interpolated_linearly():
@@ -58,7 +55,7 @@ def test_angles_are_those_of_the_frames_in_which_the_controller_commands():
         np.testing.assert_allclose(row, expected, atol=1e-9)
 
 
-def test_lines_are_checked_where_the_controller_moves(exactly):
+def test_lines_are_checked_where_the_controller_moves():
     """The robot's frames are another choice than the controller's, whose line is what is moved on."""
     start, end = at(0, 0, 550, -20, 15, 30), at(10, -20, 540, 15, -20, 10)
     belief = exactly(frames=TURNED)
@@ -67,16 +64,14 @@ def test_lines_are_checked_where_the_controller_moves(exactly):
     np.testing.assert_allclose(moved.numbers(), interpolate_line(start, end).numbers(), atol=1e-9)
 
 
-def test_a_line_is_clear_in_both_directions_or_in_none(exactly):
+def test_a_line_is_clear_in_both_directions_or_in_none():
     ends = [at(0, 0, 550, 10), at(30, 20, 560, -20, 5, 10), at(0, 0, 550, 44), at(20, 0, 899)]
     for start in ends:
         for end in ends:
             assert is_clear(exactly(), start, end) == is_clear(exactly(), end, start)
 
 
-def test_a_line_through_a_singularity_is_refused_though_both_ends_are_clear(
-    exactly, legs, paper, vector_of
-):
+def test_a_line_through_a_singularity_is_refused_though_both_ends_are_clear(legs, paper, vector_of):
     """The platform is singular at about 46 deg of A, and has margin again on the other side."""
     low, high = Pose(0, 0, 550, 30), Pose(0, 0, 550, 51)
     for pose in (low, high):
@@ -88,7 +83,7 @@ def test_a_line_through_a_singularity_is_refused_though_both_ends_are_clear(
 
 
 @pytest.mark.parametrize("start", np.arange(11.5, 17.5, 0.5))
-def test_a_singularity_between_two_samples_is_detected(exactly, start):
+def test_a_singularity_between_two_samples_is_detected(start):
     """With a small limit and long pieces the margin alone may step over it."""
     assert 3.0 * PIECES == 36.0
     assert not is_clear(
@@ -96,7 +91,7 @@ def test_a_singularity_between_two_samples_is_detected(exactly, start):
     )
 
 
-def test_the_joint_range_is_checked_along_the_line(exactly):
+def test_the_joint_range_is_checked_along_the_line():
     """Both ends are inside; in the middle, where the platform is highest, no slider is."""
     tight = exactly(joint_min=-480.0, joint_max=480.0)
     low, high = at(0, -50, 600), at(0, 60, 600)
@@ -113,7 +108,7 @@ def test_the_line_is_clear_for_the_estimated_robot_too(know, paper):
     assert not is_clear(know(paper.actual), start, end)
 
 
-def test_the_travel_is_checked_along_the_line(know, paper, exactly):
+def test_the_travel_is_checked_along_the_line(know, paper):
     """A robot with errors: a tilt of 10 deg takes the ball millimetres away from the reference."""
     real = know(paper.actual)
     start, end = at(0, 0, 550), at(0, 0, 550, 0, 0, 20)
@@ -123,7 +118,7 @@ def test_the_travel_is_checked_along_the_line(know, paper, exactly):
     assert not is_clear(real, start, end, where)
 
 
-def test_the_travel_is_around_the_reference_given(exactly):
+def test_the_travel_is_around_the_reference_given():
     start, end = at(0, 0, 550), at(4, 0, 550)
     assert is_clear(exactly(), start, end, np.array([0.0, 0.0, 550.0]))
     assert is_clear(exactly(), start, end, np.array([4.9, 0.0, 550.0]))
@@ -141,7 +136,7 @@ def test_the_travel_is_around_the_reference_given(exactly):
     ],
     ids=["tilt", "turn", "axis", "joint"],
 )
-def test_a_line_to_a_command_beyond_a_limit_is_refused(exactly, change, within, beyond):
+def test_a_line_to_a_command_beyond_a_limit_is_refused(change, within, beyond):
     limited, here = exactly(**change), at(0, 0, 550)
     assert is_clear(limited, here, at(*within))
     assert not is_clear(limited, here, at(*beyond))
@@ -160,7 +155,7 @@ def cones(degrees, distance=0.0):
     return around
 
 
-def test_passive_joints_stay_in_their_cones_along_the_line(exactly, paper):
+def test_passive_joints_stay_in_their_cones_along_the_line(paper):
     limited = exactly(legs=cones(20.0)(paper.nominal, paper.branch))
     assert is_clear(limited, at(0, 0, 550), at(0, 0, 550, 15))
     assert not is_clear(limited, at(0, 0, 550), at(0, 0, 550, 22))
@@ -194,14 +189,14 @@ def test_margins_wanted_are_four_sigma_of_what_robots_drawn_show(know, limits, p
     np.testing.assert_allclose(belief.margins_at(at_start)[0], expected, rtol=0.15)
 
 
-def test_legs_stay_apart_along_the_line(exactly, paper):
+def test_legs_stay_apart_along_the_line(paper):
     near = exactly(legs=cones(180.0, distance=70.0)(paper.nominal, paper.branch))
     assert is_clear(exactly(), at(0, 0, 550), at(-100, 100, 500))
     assert not is_clear(near, at(0, 0, 550), at(-100, 100, 500))
 
 
 @pytest.mark.parametrize("limit", ["cone", "tilt"])
-def test_a_robot_beyond_a_limit_may_come_back_and_not_go_farther(exactly, paper, limit):
+def test_a_robot_beyond_a_limit_may_come_back_and_not_go_farther(paper, limit):
     """It was moved there by hand, or its geometry is known better now."""
     change = (
         {"legs": cones(20.0)(paper.nominal, paper.branch)}

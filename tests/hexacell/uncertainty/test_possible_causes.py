@@ -46,15 +46,10 @@ def found_with(noisy, make_problem):
     return identified
 
 
-@pytest.fixture
-def moved(clean):
+def moved_by(clean, effect, causes):
     """What the causes (k,) of an effect do to the ball (55, 3), mm."""
-
-    def errors(effect, causes):
-        placement = Placement(clean.problem.mechanism, clean.geometry, clean.poses, clean.problem.joints)
-        return -(effect.on_poses(placement)[:, :3] @ causes)
-
-    return errors
+    placement = Placement(clean.problem.mechanism, clean.geometry, clean.poses, clean.problem.joints)
+    return -(effect.on_poses(placement)[:, :3] @ causes)
 
 
 def first(found):
@@ -73,13 +68,16 @@ def test_gauges_that_are_not_square(found_with, noisy):
     assert first(found_with(deviations=deviations @ lean)) == GAUGES
 
 
-def test_wavy_rails(found_with, moved):
+def test_wavy_rails(found_with, clean):
     waves = 40.0 * np.random.default_rng(3).standard_normal(12)
-    assert first(found_with(deviations=moved(rail_waves(1.0, 600.0), waves))) == GUIDES
+    assert first(found_with(deviations=moved_by(clean, rail_waves(1.0, 600.0), waves))) == GUIDES
 
 
-def test_a_load(found_with, moved):
-    assert first(found_with(deviations=moved(load_at_work(1.0, 1.0), np.array([5.0, -5.0, -40.0])))) == LOAD
+def test_a_load(found_with, clean):
+    assert (
+        first(found_with(deviations=moved_by(clean, load_at_work(1.0, 1.0), np.array([5.0, -5.0, -40.0]))))
+        == LOAD
+    )
 
 
 def test_clearance_that_changes_sides_with_the_load(found_with, clean):
@@ -136,9 +134,9 @@ def test_the_share_of_unknowns_that_explain_no_more_than_chance_is_none(found_wi
     assert test.share_of_gain(goodness.chi2 - goodness.expected, 0) == pytest.approx(1.0)
 
 
-def test_the_gain_of_columns_is_what_the_records_without_the_cause_save(found_with, clean, moved):
+def test_the_gain_of_columns_is_what_the_records_without_the_cause_save(found_with, clean):
     effect = load_at_work(1.0, 1.0)
-    wrong = found_with(deviations=moved(effect, np.array([0.0, 0.0, -20.0])))
+    wrong = found_with(deviations=moved_by(clean, effect, np.array([0.0, 0.0, -20.0])))
     saved = wrong.goodness.chi2 - clean.goodness.chi2
     test = ExcessTest(wrong)
     assert test.share_of_columns(test.by_effects(effect)) == pytest.approx(

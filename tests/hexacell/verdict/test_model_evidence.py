@@ -15,6 +15,7 @@ from hexacell.verdict.model_evidence import (
     model_tests,
 )
 from tests.hexacell.altered_records import later
+from tests.hexacell.conftest import visits
 
 NOISE_MM = 0.01
 NOISIER_MM = 0.014
@@ -31,14 +32,9 @@ def found(robot, visit):
     return identify(robot.problem(visit(seed=2).measured(NOISE_MM, 1)))
 
 
-@pytest.fixture
-def measure(visit):
+def measure(noise_mm, after, seed):
     """Records of three held-out points with some noise, numbered after others."""
-
-    def measured(noise_mm, after, seed):
-        return later(visit(points=3, orientations=8, seed=seed).measured(noise_mm, seed), after)
-
-    return measured
+    return later(visits(points=3, orientations=8, seed=seed).measured(noise_mm, seed), after)
 
 
 def evidence(robot, found, held_out, further):
@@ -48,7 +44,7 @@ def evidence(robot, found, held_out, further):
     return tests, confirmed(tests, both, np.isin(both.problem.labels[:, 0], further.points))
 
 
-def test_records_of_the_stated_noise_do_not_confirm_a_failure(robot, found, measure):
+def test_records_of_the_stated_noise_do_not_confirm_a_failure(robot, found):
     tests, after = evidence(robot, found, measure(NOISIER_MM, 5, 8), measure(NOISE_MM, 8, 11))
     assert fails_narrowly(tests)
     assert all(test.passed for test in after)
@@ -58,7 +54,7 @@ def test_records_of_the_stated_noise_do_not_confirm_a_failure(robot, found, meas
     assert taken.probability == failed.probability
 
 
-def test_as_noisy_records_confirm_it(robot, found, measure):
+def test_as_noisy_records_confirm_it(robot, found):
     tests, after = evidence(robot, found, measure(NOISIER_MM, 5, 8), measure(NOISIER_MM, 8, 11))
     assert fails_narrowly(tests)
     assert [test.passed for test in after] == [*(test.passed for test in tests), False]
@@ -66,7 +62,7 @@ def test_as_noisy_records_confirm_it(robot, found, measure):
     assert after[-1].probability < CONFIRMING_PROBABILITY
 
 
-def test_what_is_beyond_chance_is_no_narrow_failure(robot, found, measure):
+def test_what_is_beyond_chance_is_no_narrow_failure(robot, found):
     first = update(found, robot.problem(measure(3.0 * NOISE_MM, 5, 7)))
     tests = model_tests(found, first)
     (failed,) = [test for test in tests if not test.passed]

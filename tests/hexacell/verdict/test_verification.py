@@ -19,6 +19,7 @@ from hexacell.verdict.decision import Verdict
 from hexacell.verdict.model_evidence import ZEROS_DOUBTED
 from hexacell.verdict.verification import HeldOut, Verification, outcome_line, reason_of, verify
 from tests.hexacell.altered_records import later
+from tests.hexacell.conftest import visits
 from tests.small_cell import changed
 
 NOISE_MM = 0.01
@@ -44,15 +45,10 @@ def result(cell, visit):
     return robot.with_controller(as_written(cell.settings, robot, found.geometry).geometry), found
 
 
-@pytest.fixture
-def held_out(visit):
+def held_out(*machine, before=FAR, after=NEAR, left_travel=False):
     """What three held-out points of six wide poses give, with another machine if one is named."""
-
-    def measure(*machine, before=FAR, after=NEAR, left_travel=False):
-        exact = visit(*machine, points=3, orientations=6, seed=7).measured(NOISE_MM, 3)
-        return HeldOut(later(exact), before, after, left_travel)
-
-    return measure
+    exact = visits(*machine, points=3, orientations=6, seed=7).measured(NOISE_MM, 3)
+    return HeldOut(later(exact), before, after, left_travel)
 
 
 @pytest.fixture
@@ -62,7 +58,7 @@ def bent(paper):
     return type(paper.actual).of(paper.actual.parameters, {**paper.actual.document(), "l": lengths})
 
 
-def test_a_good_result_passes_and_its_true_error_is_within_u(cell, result, held_out, paper):
+def test_a_good_result_passes_and_its_true_error_is_within_u(cell, result, paper):
     robot, found = result
     verified = verified_by(cell, result, held_out())
     assert verified.verdict is Verdict.PASS
@@ -117,7 +113,7 @@ def test_an_error_is_none_only_if_a_frame_that_takes_it_away_can_be_taught(
     assert np.linalg.norm(true, axis=-1).max() > 0.01
 
 
-def test_what_cannot_be_taught_adds_to_u(cell, result, held_out):
+def test_what_cannot_be_taught_adds_to_u(cell, result):
     robot, found = result
     every = (replace(robot, work_frame=axes) for axes in ("", "z", "xyz"))
     verified = [verified_by(cell, (one, found), held_out()).accuracy for one in every]
@@ -125,7 +121,7 @@ def test_what_cannot_be_taught_adds_to_u(cell, result, held_out):
     assert shifted > about_z > free
 
 
-def test_held_out_records_that_were_not_predicted_are_no_evidence(cell, result, held_out, bent):
+def test_held_out_records_that_were_not_predicted_are_no_evidence(cell, result, bent):
     verified = verified_by(cell, result, held_out(bent))
     assert verified.verdict in {Verdict.NOT_EVALUATED, Verdict.FAIL, Verdict.CONDITIONAL_FAIL}
     failed = [test for test in verified.tests if not test.passed]
@@ -134,14 +130,15 @@ def test_held_out_records_that_were_not_predicted_are_no_evidence(cell, result, 
     assert verified.is_offered
 
 
-def test_significantly_worse_is_a_fail_that_nobody_is_offered(cell, result, held_out):
-    verified = verified_by(cell, result, held_out(before=NEAR, after=FAR))
+@pytest.mark.parametrize("how", [{"before": NEAR, "after": FAR}, {"left_travel": True}])
+def test_what_is_worse_or_left_its_plates_is_a_fail_that_nobody_is_offered(cell, result, how):
+    verified = verified_by(cell, result, held_out(**how))
     assert (verified.verdict, verified.is_worse, verified.is_offered) == (Verdict.FAIL, True, False)
 
 
 @pytest.mark.parametrize("is_calibrated", [False, True])
 def test_where_deviations_only_scatter_the_records_say_whether_the_geometry_is_better(
-    cell, visit, held_out, is_calibrated
+    cell, visit, is_calibrated
 ):
     settings = changed(cell.settings, {"noise.stops": 0.3})
     robot = robot_of(replace(cell, settings=settings))
@@ -156,7 +153,7 @@ def test_where_deviations_only_scatter_the_records_say_whether_the_geometry_is_b
 
 @pytest.mark.parametrize("is_worse", [False, True])
 def test_zeros_that_may_not_run_are_named_where_the_controller_reads_the_encoders(
-    cell, result, held_out, bent, is_worse
+    cell, result, bent, is_worse
 ):
     measured = held_out(bent, before=NEAR if is_worse else FAR, after=FAR if is_worse else NEAR)
     told = []
@@ -169,25 +166,20 @@ def test_zeros_that_may_not_run_are_named_where_the_controller_reads_the_encoder
     assert told == [True, False, False]
 
 
-def test_zeros_are_not_doubted_where_the_held_out_records_agree(cell, result, held_out):
+def test_zeros_are_not_doubted_where_the_held_out_records_agree(cell, result):
     changes = {"encoders.protocol": "controller", "controller.joints_include_zeros": True}
     settings = changed(cell.settings, changes)
     worse = verified_by(replace(cell, settings=settings), result, held_out(before=NEAR, after=FAR))
     assert reason_of(worse) == "worse than before"
 
 
-def test_a_ball_that_left_its_plates_is_a_fail_that_nobody_is_offered(cell, result, held_out):
-    verified = verified_by(cell, result, held_out(left_travel=True))
-    assert (verified.verdict, verified.is_offered) == (Verdict.FAIL, False)
-
-
 @pytest.mark.parametrize("missing", ["before", "after"])
-def test_without_both_measurements_nothing_is_evaluated(cell, result, held_out, missing):
+def test_without_both_measurements_nothing_is_evaluated(cell, result, missing):
     verified = verified_by(cell, result, held_out(**{missing: []}))
     assert (verified.verdict, verified.is_offered) == (Verdict.NOT_EVALUATED, False)
 
 
-def test_the_outcome_says_what_was_used_the_error_and_the_verdict(cell, result, held_out):
+def test_the_outcome_says_what_was_used_the_error_and_the_verdict(cell, result):
     _, found = result
     verified = verified_by(cell, result, held_out())
     line = outcome_line(IdentificationResult.of(found), 35, verified)

@@ -9,33 +9,28 @@ from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import Noise
 from hexacell.measurements.records import MeasurementSet
 from tests.hexacell.altered_records import altered
+from tests.hexacell.conftest import visits
 
 ALIGNMENT = float(np.radians(0.3))
 SCALE = 0.002
 STATED = Noise(0.01, 0.01, alignment=ALIGNMENT, gauge_scale=SCALE)
 
 
-@pytest.fixture(scope="module")
-def set_up(visit):
+def set_up(seed: int) -> MeasurementSet:
     """Measurements with stations turned by 0.3 deg and gauges off by 0.2 %, one sigma each."""
-    exact = visit(seed=2)
+    random = np.random.default_rng(1000 + seed)
+    turns = Rotation.from_rotvec(ALIGNMENT * random.standard_normal((5, 3))).as_matrix()
+    scale = 1.0 + SCALE * random.standard_normal(3)
 
-    def measured(seed: int) -> MeasurementSet:
-        random = np.random.default_rng(1000 + seed)
-        turns = Rotation.from_rotvec(ALIGNMENT * random.standard_normal((5, 3))).as_matrix()
-        scale = 1.0 + SCALE * random.standard_normal(3)
+    def seen(record):
+        joints = np.add(record.joints, 0.01 * random.standard_normal(6))
+        shown = scale * (turns[record.point - 1] @ record.deviation)
+        return {"joints": joints, "deviation": shown + 0.01 * random.standard_normal(3)}
 
-        def seen(record):
-            joints = np.add(record.joints, 0.01 * random.standard_normal(6))
-            shown = scale * (turns[record.point - 1] @ record.deviation)
-            return {"joints": joints, "deviation": shown + 0.01 * random.standard_normal(3)}
-
-        return altered(exact.measured(), seen)
-
-    return measured
+    return altered(visits(seed=2).measured(), seen)
 
 
-def test_the_covariance_predicts_the_errors_with_misaligned_stations(paper, set_up, make_problem):
+def test_the_covariance_predicts_the_errors_with_misaligned_stations(paper, make_problem):
     count = 12
     errors, chi_squares = [], []
     for seed in range(count):
@@ -49,7 +44,7 @@ def test_the_covariance_predicts_the_errors_with_misaligned_stations(paper, set_
         assert low < sum(values) < high
 
 
-def test_unmodelled_misalignment_costs_accuracy_and_fails_the_chi_square_test(paper, set_up, make_problem):
+def test_unmodelled_misalignment_costs_accuracy_and_fails_the_chi_square_test(paper, make_problem):
     knowing = identify(make_problem(set_up(0), noise=STATED))
     unaware = identify(make_problem(set_up(0), noise=Noise(0.01, 0.01)))
     assert unaware.chi2 > 10 * unaware.dof

@@ -2,15 +2,11 @@
 
 import pytest
 
-from hexacell.verdict.acceptance_gates import AcceptanceGate
 from tests.cli.terminal import ended
-from tests.hexacell.services.proposed_runs import MET, propose_run
+from tests.hexacell.services.proposed_runs import GRAVE, MET, propose_run
 
 pytestmark = pytest.mark.usefixtures("records_agree")
 
-GRAVE = AcceptanceGate(
-    name="within tolerance", passed=False, sentence="Beyond: S1x.", needs_person=True, needs_cell_name=True
-)
 KEYS_APPLIED = {"applied", "by", "config", "further_configs", "run", "sha256", "teach", "recorded"}
 KEYS_RESTORED = {"restored", "config", "further_configs", "from", "undone", "recorded"}
 

@@ -137,16 +137,9 @@ def test_the_identified_geometry_is_the_true_one(demo):
 
 def test_the_run_has_all_documented_files_and_is_in_the_history(demo, typed_here):
     promised = {
-        "journal.jsonl",
-        "cell.toml",
-        "measurements.csv",
-        "result.json",
-        "proposal.json",
-        "config-before",
-        "config-after",
-        "write-back.json",
-        "wire",
-    }
+        "journal.jsonl", "cell.toml", "measurements.csv", "result.json", "proposal.json",
+        "config-before", "config-after", "write-back.json", "wire",
+    }  # fmt: skip
     assert {path.name for path in demo.run.iterdir()} >= promised
     [_, line] = typed_here("history", demo.cell).out.splitlines()
     assert line.startswith("demo ")

@@ -137,13 +137,3 @@ def test_a_damaged_record_is_warned_about(cell, typed_here) -> None:
     listed = typed_here("history", cell.path, "--changes")
     assert (listed.code, "applied" in listed.out) == (0, True)
     assert "line 2: this record is torn" in listed.err
-
-
-def test_a_write_without_a_record_is_told_in_a_line(cell, typed_here) -> None:
-    run = propose_run(cell)
-    (run.folder.siblings / RECORDS).mkdir()
-    applied = typed_here("apply", run.folder.path)
-    assert (applied.code, cell.config_path.read_bytes()) == (0, run.after)
-    assert "the history has no record of it" in " ".join(applied.out.split())
-    back = typed_here("rollback", cell.path, "--json")
-    assert (back.code, back.document["recorded"], cell.config_path.read_bytes()) == (0, False, run.before)

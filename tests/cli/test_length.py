@@ -13,20 +13,15 @@ def without_fixture(text: str) -> str:
     return re.sub(r"^\[length_check\]\n(?:.+\n)*", "", text, flags=re.MULTILINE)
 
 
-@pytest.fixture
-def calibrated(typed_here, quick_cell, few_candidates):
-    """A quick cell whose encoders are long, calibrated with a length check; and how that ended."""
-    quick_cell.edit(LONG)
-    outcome = typed_here("run", quick_cell.cell, *CALIBRATE, "--length-check", "--json")
-    assert outcome.code == 0, outcome.err  # the limits of a quick cell are wide
-    return quick_cell, outcome
-
-
 @pytest.mark.slow
 def test_a_run_and_the_command_find_the_same_scale_and_the_command_changes_nothing(
-    typed_here, typed, calibrated
+    typed_here, typed, quick_cell, few_candidates
 ) -> None:
-    cell, outcome = calibrated
+    """Of a cell whose encoders are long, with limits that are wide."""
+    cell = quick_cell
+    cell.edit(LONG)
+    outcome = typed_here("run", cell.cell, *CALIBRATE, "--length-check", "--json")
+    assert outcome.code == 0, outcome.err
     within = outcome.document["verification"]["accuracy"]["length"]
     assert within["long_um_m"] == pytest.approx(1000.0, abs=within["expanded_um_m"])
     assert "length scale: checked over 300.000 mm: encoders read " in outcome.err

@@ -13,18 +13,10 @@ from procedures.steps import events
 from tests.mutations.journals import with_checksum
 
 CHAPTERS = [
-    "Statement of conformity",
-    "As found and as left",
-    "Subject and method",
-    "Figures",
-    "Uncertainty budget of the identified geometry",
-    "Identified geometry",
-    "Observability",
-    "Conditions",
-    "Instruments and traceability",
-    "Files",
-    "Authorisation",
-]
+    "Statement of conformity", "As found and as left", "Subject and method", "Figures",
+    "Uncertainty budget of the identified geometry", "Identified geometry", "Observability",
+    "Conditions", "Instruments and traceability", "Files", "Authorisation",
+]  # fmt: skip
 
 
 def text_of(page: str) -> str:

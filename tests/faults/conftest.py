@@ -148,26 +148,24 @@ class Whole:
         return self.site.run()
 
 
-def whole(program: Program, folder: Path, *changes: dict[str, Any]) -> Whole:
+def whole(program: Program, folder: Path, *changes: dict[str, Any], code: int = 0) -> Whole:
     site = make_site(folder / "cell", *changes)
     before = site.config.read_bytes()
     ended = program.run(site, failing={})
+    assert ended.code == code, ended.words
     return Whole(site, changes, ended, read_journal(site.run().journal), before)
 
 
 @pytest.fixture(scope="session")
 def undisturbed(program: Program, tmp_path_factory: pytest.TempPathFactory) -> Whole:
     """A run that passes."""
-    found = made_once(tmp_path_factory, "undisturbed", lambda folder: whole(program, folder))
-    assert found.ended.code == 0, found.ended.words
-    return found
+    return made_once(tmp_path_factory, "undisturbed", lambda folder: whole(program, folder))
 
 
 @pytest.fixture(scope="session")
 def rolled_back(program: Program, session_ground: Path) -> Whole:
     """A run whose result is not good enough and is taken back."""
-    found = whole(program, session_ground / "rolled back", NEVER_GOOD_ENOUGH)
-    assert found.ended.code == 1, found.ended.words
+    found = whole(program, session_ground / "rolled back", NEVER_GOOD_ENOUGH, code=1)
     assert found.site.config.read_bytes() == found.config_before
     return found
 
@@ -175,17 +173,13 @@ def rolled_back(program: Program, session_ground: Path) -> Whole:
 @pytest.fixture(scope="session")
 def lent(program: Program, session_ground: Path) -> Whole:
     """A run whose controller is lent a geometry meanwhile."""
-    found = whole(program, session_ground / "lent", PROVISIONAL)
-    assert found.ended.code == 0, found.ended.words
-    return found
+    return whole(program, session_ground / "lent", PROVISIONAL)
 
 
 @pytest.fixture(scope="session")
 def noise_measured(program: Program, tmp_path_factory: pytest.TempPathFactory) -> Whole:
     """A run that measures the noise at its first reference."""
-    found = made_once(tmp_path_factory, "noise", lambda folder: whole(program, folder, MEASURED))
-    assert found.ended.code == 0, found.ended.words
-    return found
+    return made_once(tmp_path_factory, "noise", lambda folder: whole(program, folder, MEASURED))
 
 
 @pytest.fixture

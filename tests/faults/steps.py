@@ -21,29 +21,11 @@ from procedures.steps.standstill import Standstill
 from procedures.steps.try_gauges import Try
 
 STEPS = (
-    "beginning",
-    "locating",
-    "revisiting",
-    "to reference",
-    "placing",
-    "zeroing",
-    "trying gauges",
-    "to orientation",
-    "sampling",
-    "closing",
-    "measuring noise",
-    "lending",
-    "taking back",
-    "identifying",
-    "held-out",
-    "proposing",
-    "committing",
-    "after",
-    "length",
-    "judging",
-    "rolling back",
+    "beginning", "locating", "revisiting", "to reference", "placing", "zeroing", "trying gauges",
+    "to orientation", "sampling", "closing", "measuring noise", "lending", "taking back",
+    "identifying", "held-out", "proposing", "committing", "after", "length", "judging", "rolling back",
     "ending",
-)
+)  # fmt: skip
 """Kinds of steps, in the order of a run; held-out points are measured before and after the commit."""
 COMPUTING = {
     "assess noise": "measuring noise",

@@ -179,29 +179,24 @@ def user() -> int | None:
     return NOBODY if os.geteuid() == 0 else None
 
 
-class TestPermissions:
-    """Each is refused before anything moves."""
-
-    @pytest.fixture
-    def refused(self, program: Any, ground: Path, user: int | None, undisturbed: Any) -> Any:
-        def run(site: Site, words: str) -> None:
-            ground.chmod(0o777)
-            ended = program.run(site, user=user)
-            assert ended.code == 2, ended.words
-            assert words in ended.words
-            assert site.config.read_bytes() == undisturbed.config_before
-            assert not site.runs()
-
-        return run
-
-    def test_a_read_only_cell_folder_is_refused(self, new_site: Any, refused: Any) -> None:
-        site = new_site()
-        site.folder.chmod(0o555)
-        refused(site, "Have the owner of the folder create it once, empty, with mode 644")
-
-    def test_a_read_only_runs_folder_is_refused(self, new_site: Any, refused: Any) -> None:
-        site = new_site()
-        site.folder.chmod(0o777)
-        runs = site.folder / "runs"
-        runs.mkdir(mode=0o555)
-        refused(site, f"{runs}")
+@pytest.mark.parametrize(
+    ("modes", "words"),
+    [
+        ((0o555,), "Have the owner of the folder create it once, empty, with mode 644"),
+        ((0o777, 0o555), "runs"),
+    ],
+    ids=["cell folder", "runs folder"],
+)
+def test_a_read_only_folder_is_refused_before_anything_moves(
+    program: Any, new_site: Any, ground: Path, user: int | None, undisturbed: Any, modes: Any, words: str
+) -> None:
+    site = new_site()
+    ground.chmod(0o777)
+    for folder, mode in zip((site.folder, site.folder / "runs"), modes, strict=False):
+        folder.mkdir(exist_ok=True)
+        folder.chmod(mode)
+    ended = program.run(site, user=user)
+    assert ended.code == 2, ended.words
+    assert (str(site.folder / words) if words == "runs" else words) in ended.words
+    assert site.config.read_bytes() == undisturbed.config_before
+    assert not site.runs()

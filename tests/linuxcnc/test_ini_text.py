@@ -32,18 +32,8 @@ headers = st.tuples(gaps, st.sampled_from(SECTIONS), st.sampled_from(["", " ", "
 )
 others = st.sampled_from(
     [
-        "",
-        "# X = 7",
-        "; X = 7",
-        "#INCLUDE other.inc",
-        "X 7",
-        "X y = 7",
-        "x",
-        "[A",
-        "# goes on \\",
-        "NOTE = a\\",
-        "[ A ]",
-        "\u00b5 = 1",
+        *("", "# X = 7", "; X = 7", "#INCLUDE other.inc", "X 7", "X y = 7", "x", "[A"),
+        *("# goes on \\", "NOTE = a\\", "[ A ]", "\u00b5 = 1"),
     ]
 )
 

@@ -34,18 +34,6 @@ async def test_a_cancelled_read_returns_soon_and_the_next_one_is_right(raw, make
     assert (await bank.read()).counts == (2, 2000, 3000, 4000, 5000, 6000)
 
 
-async def test_cancelling_at_any_moment_leaves_the_samples_synchronized(raw, opened):
-    for node in raw.nodes.values():
-        node.answers_sync = lambda sync: [sync.to_bytes(4, "little")]
-    for step in range(60):
-        reading = asyncio.ensure_future(opened.read())
-        await asyncio.sleep(step * 0.00005)
-        reading.cancel()
-        await asyncio.gather(reading, return_exceptions=True)
-    found = await opened.read()
-    assert found.counts == (raw.syncs,) * 6
-
-
 async def test_a_cancelled_open_leaves_nothing(raw, bank):
     before = set(threading.enumerate())
     answer = raw.nodes[1].answer_sdo

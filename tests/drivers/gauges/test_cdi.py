@@ -94,12 +94,6 @@ async def test_an_indicator_that_has_reported_parameters_must_still_do_so(dialog
         await opened.check()
 
 
-async def test_an_inch_gauge_is_refused(dialogue, gauge):
-    dialogue.expect((b"R\r", b"+ 0.08417, IN\r\n"))
-    with pytest.raises(WrongSetting, match="gauge y: answers in inch"):
-        await gauge.open()
-
-
 async def test_the_unit_is_requested_with_the_plunger_at_its_end(dialogue, gauge):
     at_end = opening(b"OUT OF BOUNDS\r\n")
     dialogue.expect(*[at_end[0], (b"?p013\r", b"1\r\n"), *at_end[1:]] * 3)

@@ -9,18 +9,12 @@ from pathlib import Path
 
 import pytest
 
+from hexacell.runs import run_folder
 from hexacell.runs.archive import INDEX, Archive
-from hexacell.runs.run_folder import (
-    ArchiveUnavailable,
-    DocumentKind,
-    RunFolder,
-    StampedDocument,
-    folder_stamps,
-)
 from hexacell.storage.atomic_files import write_atomically
 
-SUMMARY, RESULT = DocumentKind.SUMMARY, DocumentKind.RESULT
-ONE = {"a": StampedDocument("1", b"one"), "b": StampedDocument("2", b"two")}
+SUMMARY, RESULT = run_folder.DocumentKind.SUMMARY, run_folder.DocumentKind.RESULT
+ONE = {"a": run_folder.StampedDocument("1", b"one"), "b": run_folder.StampedDocument("2", b"two")}
 
 
 @contextmanager
@@ -33,7 +27,7 @@ def filled(folder: Path) -> Path:
     """The file of an archive with documents."""
     with opened(folder) as archive:
         archive.store(SUMMARY, ONE)
-        archive.store(RESULT, {"a": StampedDocument("1", b"result" * 5000)})
+        archive.store(RESULT, {"a": run_folder.StampedDocument("1", b"result" * 5000)})
     return folder / INDEX
 
 
@@ -41,8 +35,8 @@ def test_what_is_kept_is_found_again(tmp_path) -> None:
     filled(tmp_path)
     with opened(tmp_path) as archive:
         assert archive.documents(SUMMARY) == ONE
-        archive.store(SUMMARY, {"a": StampedDocument("3", b"new")})
-        assert archive.documents(SUMMARY) == ONE | {"a": StampedDocument("3", b"new")}
+        archive.store(SUMMARY, {"a": run_folder.StampedDocument("3", b"new")})
+        assert archive.documents(SUMMARY) == ONE | {"a": run_folder.StampedDocument("3", b"new")}
         archive.forget(["a"])
         assert (list(archive.documents(SUMMARY)), archive.documents(RESULT)) == (["b"], {})
 
@@ -84,7 +78,7 @@ def test_what_cannot_be_used_says_so_and_is_left_alone(tmp_path, monkeypatch) ->
     before = path.read_bytes()
     with closing(sqlite3.connect(path)) as other:
         other.execute("begin exclusive")
-        with opened(tmp_path) as archive, pytest.raises(ArchiveUnavailable, match="locked"):
+        with opened(tmp_path) as archive, pytest.raises(run_folder.ArchiveUnavailable, match="locked"):
             archive.documents(SUMMARY)
     assert path.read_bytes() == before
 
@@ -99,35 +93,37 @@ def test_others_may_not_write_it(tmp_path) -> None:
 
 
 def test_every_change_of_a_folder_shows(tmp_path) -> None:
-    run = RunFolder(tmp_path / "a")
+    run = run_folder.RunFolder(tmp_path / "a")
     run.path.mkdir()
-    seen = [folder_stamps(tmp_path)["a"]]
+    seen = [run_folder.folder_stamps(tmp_path)["a"]]
     run.journal.write_bytes(b"1\n")
-    seen.append(folder_stamps(tmp_path)["a"])
+    seen.append(run_folder.folder_stamps(tmp_path)["a"])
     with run.journal.open("ab") as journal:
         journal.write(b"2\n")
-    seen.append(folder_stamps(tmp_path)["a"])
+    seen.append(run_folder.folder_stamps(tmp_path)["a"])
     write_atomically(run.proposal, b"{}")
-    seen.append(folder_stamps(tmp_path)["a"])
+    seen.append(run_folder.folder_stamps(tmp_path)["a"])
     run.proposal.unlink()
-    seen.append(folder_stamps(tmp_path)["a"])
+    seen.append(run_folder.folder_stamps(tmp_path)["a"])
     assert len(set(seen)) == len(seen)
-    assert folder_stamps(tmp_path)["a"] == seen[-1]
-    assert folder_stamps(tmp_path / "none") == {}
+    assert run_folder.folder_stamps(tmp_path)["a"] == seen[-1]
+    assert run_folder.folder_stamps(tmp_path / "none") == {}
 
 
 def test_what_is_no_file_is_left_alone(tmp_path) -> None:
     (tmp_path / INDEX).mkdir()
-    with opened(tmp_path) as archive, pytest.raises(ArchiveUnavailable):
+    with opened(tmp_path) as archive, pytest.raises(run_folder.ArchiveUnavailable):
         archive.documents(SUMMARY)
     assert (tmp_path / INDEX).is_dir()
 
 
 def test_several_processes_may_keep_the_same_at_once(tmp_path) -> None:
-    def fill(number: int) -> dict[str, StampedDocument]:
+    def fill(number: int) -> dict[str, run_folder.StampedDocument]:
         with opened(tmp_path) as archive:
             for count in range(5):
-                archive.store(SUMMARY, {name: StampedDocument(str(count), b"x") for name in "abcdef"})
+                archive.store(
+                    SUMMARY, {name: run_folder.StampedDocument(str(count), b"x") for name in "abcdef"}
+                )
             return archive.documents(SUMMARY)
 
     with ThreadPoolExecutor(4) as pool:

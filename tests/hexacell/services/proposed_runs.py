@@ -24,6 +24,9 @@ from tests.recorded_events import record
 from tests.small_cell import FEW_CHOICES
 
 MET = AcceptanceGate(name="converged", passed=True, sentence="It converged.")
+GRAVE = AcceptanceGate(
+    name="within tolerance", passed=False, sentence="Beyond: S1x.", needs_person=True, needs_cell_name=True
+)
 
 
 def a_cell(folder: Path) -> Cell:

@@ -149,13 +149,8 @@ def test_a_worker_that_comes_later_with_another_version_is_named(shared, monkeyp
 
 def test_what_is_no_address_is_refused() -> None:
     for address in (
-        "",
-        "here",
-        "127.0.0.1:8786",
-        "tcp://127.0.0.1",
-        "tcp://:port",
-        "tcp://host:65536",
-        "tcp://[::1:8786",
+        *("", "here", "127.0.0.1:8786", "tcp://127.0.0.1"),
+        *("tcp://:port", "tcp://host:65536", "tcp://[::1:8786"),
     ):
         with pytest.raises(UsageError, match="is not an address of a Dask scheduler"):
             dask_cluster(address)

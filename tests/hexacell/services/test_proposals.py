@@ -26,15 +26,12 @@ from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import Verdict
 from procedures.engine.commands import UnattendedOperator
 from procedures.run.questions import PendingChange, Question
-from tests.hexacell.services.proposed_runs import MET, ProposedRun, propose_run
+from tests.hexacell.services.proposed_runs import GRAVE, MET, ProposedRun, propose_run
 
 pytestmark = pytest.mark.usefixtures("records_agree")
 
 DOUBTFUL = AcceptanceGate(
     name="agrees with the noise", passed=False, sentence="Doubtful: 1.4 times.", needs_person=True
-)
-GRAVE = AcceptanceGate(
-    name="within tolerance", passed=False, sentence="Beyond: S1x.", needs_person=True, needs_cell_name=True
 )
 HOPELESS = AcceptanceGate(name="converged", passed=False, sentence="It did not converge.")
 

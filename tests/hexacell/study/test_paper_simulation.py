@@ -2,22 +2,14 @@
 
 import pytest
 
-from hexacell.study.paper_simulation import (
-    Errors,
-    MedianErrors,
-    Outcome,
-    Trial,
-    run_trial,
-    summary,
-    trials_of,
-)
+from hexacell.study import paper_simulation
 
-MOST = Trial(5, 11, 0)
+MOST = paper_simulation.Trial(5, 11, 0)
 
 
 @pytest.fixture(scope="module")
 def most():
-    return run_trial(MOST)
+    return paper_simulation.run_trial(MOST)
 
 
 def test_without_noise_both_find_the_robot(most) -> None:
@@ -30,30 +22,34 @@ def test_with_noise_errors_are_those_of_the_order_of_the_paper(most) -> None:
 
 @pytest.mark.parametrize(("points", "orientations"), [(1, 11), (2, 5)])
 def test_what_cannot_be_identified_is_refused(points: int, orientations: int) -> None:
-    found = run_trial(Trial(points, orientations, 0))
+    found = paper_simulation.run_trial(paper_simulation.Trial(points, orientations, 0))
     assert found.exact.ours == found.noisy.ours == {}
     assert found.exact.paper_mm > 1.0
 
 
-def errors(paper: float | None, ours: float | None) -> Errors:
-    return Errors(
+def errors(paper: float | None, ours: float | None) -> paper_simulation.Errors:
+    return paper_simulation.Errors(
         {} if paper is None else {"S": paper, "B": 0.1, "l": 0.1},
         {} if ours is None else {"S": ours, "B": 0.1, "l": 0.1},
     )
 
 
 def test_medians_are_of_the_draws_that_each_estimator_ends() -> None:
-    found = MedianErrors.of([errors(1.0, 0.5), errors(3.0, 0.7), errors(None, 0.3), errors(2.0, None)])
+    found = paper_simulation.MedianErrors.of(
+        [errors(1.0, 0.5), errors(3.0, 0.7), errors(None, 0.3), errors(2.0, None)]
+    )
     assert (found.trials, found.settled, found.refused) == (4, 3, 1)
     assert (found.paper_mm, found.ours_there_mm, found.ours_mm) == (2.0, 0.6, 0.5)
 
 
 def test_all_of_it_is_of_its_own_trials() -> None:
     outcomes = {
-        one: Outcome(errors(one.points, 0.5), errors(one.orientations, 0.1), 10.0 * one.points)
-        for one in trials_of(2)
+        one: paper_simulation.Outcome(
+            errors(one.points, 0.5), errors(one.orientations, 0.1), 10.0 * one.points
+        )
+        for one in paper_simulation.trials_of(2)
     }
-    study = summary(outcomes)
+    study = paper_simulation.summary(outcomes)
     assert [one.exact.paper_mm for one in study.figures[4]] == [1, 2, 3, 4, 5]
     assert {one.noisy.paper_mm for one in study.figures[5]} == {5}
     assert [one.deviation_mm for one in study.figures[5]] == [10, 20, 30, 40, 50]

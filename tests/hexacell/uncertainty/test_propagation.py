@@ -11,19 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hexacell.kinematics.parameters import MachinePart
-from hexacell.uncertainty.effect_kinds import (
-    ball_beside_tool,
-    ball_roundness,
-    common_encoder_scale,
-    common_sag,
-    encoder_scales,
-    gauge_scales,
-    load_at_work,
-    rail_directions,
-    rail_waves,
-    stop_repeatability,
-    temperature_at_work,
-)
+from hexacell.uncertainty import effect_kinds
 from hexacell.uncertainty.effects import Effect, Occurrence
 
 ALUMINIUM = {MachinePart.BASE: 6.0, MachinePart.LEGS: 23.0, MachinePart.PLATFORM: 12.0}
@@ -61,23 +49,28 @@ def sine(along):
 
 
 CONSTANT = {
-    "common scale": (common_encoder_scale(1.0), 0, 50.0, scaled(np.ones(6), 50e-6)),
-    "scale of encoder 3": (encoder_scales(1.0), 2, 50.0, scaled(np.eye(6)[2], 50e-6)),
+    "common scale": (effect_kinds.common_encoder_scale(1.0), 0, 50.0, scaled(np.ones(6), 50e-6)),
+    "scale of encoder 3": (effect_kinds.encoder_scales(1.0), 2, 50.0, scaled(np.eye(6)[2], 50e-6)),
     "rail of legs 2 and 5, turned sideways": (
-        rail_directions(1.0),
+        effect_kinds.rail_directions(1.0),
         1,
         0.05,
         displaced([1, 4], 1, lambda along: 5e-5 * along),
     ),
     "rail of legs 3 and 4, turned upwards": (
-        rail_directions(1.0),
+        effect_kinds.rail_directions(1.0),
         5,
         0.05,
         displaced([2, 3], 2, lambda along: 5e-5 * along),
     ),
-    "rail of legs 1 and 6, wavy sideways": (rail_waves(1.0, 600.0), 0, 20.0, displaced([0, 5], 1, sine)),
+    "rail of legs 1 and 6, wavy sideways": (
+        effect_kinds.rail_waves(1.0, 600.0),
+        0,
+        20.0,
+        displaced([0, 5], 1, sine),
+    ),
     "sag": (
-        common_sag(1.0, HALF_LENGTH_MM),
+        effect_kinds.common_sag(1.0, HALF_LENGTH_MM),
         0,
         50.0,
         displaced([0, 1, 2, 3, 4, 5], 2, lambda along: 0.05 * (along / HALF_LENGTH_MM) ** 2),
@@ -113,7 +106,7 @@ def test_a_gauge_that_reads_too_much_is_propagated_through_the_result_only(labor
     records = laboratory.visits.measured().records
     changed = [_read(record, np.asarray(record.deviation) * [1.0, 1.001, 1.0]) for record in records]
     found = laboratory.identified(type(laboratory.visits.measured())(tuple(changed)))
-    effect = gauge_scales(1.0, is_estimated=False)
+    effect = effect_kinds.gauge_scales(1.0, is_estimated=False)
     change = propagation.parameter_columns(effect)[:, 1]
     assert found.free - exact.free == pytest.approx(change, abs=SHARE * np.abs(change).max())
     assert propagation.columns(effect).direct.size == 0
@@ -131,7 +124,7 @@ def test_an_ellipsoid_touched_by_three_plates_is_the_harmonic_of_its_axis(labora
     )
     found = laboratory.identified(type(measured)(changed))
     # 6 um (z^2 - 1/3) is 6 sqrt(12) / 3 um times the harmonic, the constant goes to the gauges' zero.
-    columns = propagation.parameter_columns(ball_roundness(1.0)) / np.sqrt(1.5)
+    columns = propagation.parameter_columns(effect_kinds.ball_roundness(1.0)) / np.sqrt(1.5)
     change = 6.0 * np.sqrt(12.0) / 3.0 * columns[:, 4]
     assert found.free - exact.free == pytest.approx(change, abs=SHARE * np.abs(change).max())
 
@@ -155,7 +148,7 @@ def test_a_stop_that_the_encoders_miss_is_one_cause_at_one_record(laboratory, ex
 
     records = len(laboratory.visits.joints)
     each = np.array([alone(row, leg) for row in range(records) for leg in range(6)])
-    columns = propagation.parameter_columns(stop_repeatability(1.0))
+    columns = propagation.parameter_columns(effect_kinds.stop_repeatability(1.0))
     assert columns.shape[1] <= len(exact.free)
     assert columns @ columns.T == pytest.approx(each.T @ each, rel=1e-9, abs=1e-15)
 
@@ -171,7 +164,7 @@ def test_a_stop_that_the_encoders_miss_is_one_cause_at_one_record(laboratory, ex
 
 
 def test_a_missed_stop_at_a_task_pose_is_not_taught_away(laboratory, propagation) -> None:
-    direct = propagation.columns(stop_repeatability(1.0)).direct
+    direct = propagation.columns(effect_kinds.stop_repeatability(1.0)).direct
     machine = lambda shown: (laboratory.paper.actual, shown + 0.01 * np.eye(6)[3])  # noqa: E731
     moved = laboratory.errors(machine, laboratory.paper.actual, laboratory.task)
     rows = range(len(laboratory.task))
@@ -182,12 +175,13 @@ def test_a_missed_stop_at_a_task_pose_is_not_taught_away(laboratory, propagation
 
 def test_missed_stops_in_the_noise_of_the_records_act_at_work_alone(propagation) -> None:
     everywhere, at_work = (
-        propagation.columns(stop_repeatability(1.0, is_in_noise=in_noise)) for in_noise in (False, True)
+        propagation.columns(effect_kinds.stop_repeatability(1.0, is_in_noise=in_noise))
+        for in_noise in (False, True)
     )
     assert np.count_nonzero(everywhere.through)
     assert at_work.through.shape[-1] == 0
     np.testing.assert_array_equal(at_work.combined, everywhere.direct)
-    assert propagation.chi_square(stop_repeatability(1.0, is_in_noise=True)) == 0.0
+    assert propagation.chi_square(effect_kinds.stop_repeatability(1.0, is_in_noise=True)) == 0.0
 
 
 def test_a_machine_that_is_warmer_at_work_errs_as_its_lengths_say(laboratory, propagation) -> None:
@@ -198,7 +192,9 @@ def test_a_machine_that_is_warmer_at_work_errs_as_its_lengths_say(laboratory, pr
         l=actual["l"] * (1 + 23e-6 * kelvin),
     )
     errors = laboratory.task_errors(lambda shown: (warm, shown * (1 + 6e-6 * kelvin)), actual)
-    expected = kelvin * propagation.columns(temperature_at_work(1.0, ALUMINIUM)).combined[..., 0]
+    expected = (
+        kelvin * propagation.columns(effect_kinds.temperature_at_work(1.0, ALUMINIUM)).combined[..., 0]
+    )
     assert errors == pytest.approx(expected, abs=SHARE * np.abs(expected[:, :3]).max())
 
 
@@ -221,14 +217,14 @@ def test_a_force_on_the_tool_bends_the_legs_as_springs_in_parallel(laboratory, p
             rows.append(np.linalg.inv(jacobian.T @ jacobian)[:, :3] * 5e-5)
         return np.array(rows)
 
-    effect = load_at_work(1.0, 0.05)
+    effect = effect_kinds.load_at_work(1.0, 0.05)
     assert effect.on_poses is not None
     expected = yielding(propagation.task)
     assert effect.on_poses(propagation.task) == pytest.approx(expected, rel=1e-3, abs=1e-3 * expected.max())
 
 
 def test_a_tool_beside_the_ball_turns_with_the_platform(propagation) -> None:
-    effect = ball_beside_tool(1.0)
+    effect = effect_kinds.ball_beside_tool(1.0)
     assert effect.on_poses is not None
     errors = effect.on_poses(propagation.task)
     assert errors[:, :3] == pytest.approx(propagation.task.poses.rotations)
@@ -255,7 +251,7 @@ def test_an_estimate_shares_constant_effects_with_the_earlier_one_that_is_its_pr
 
 
 def test_missed_stops_of_an_earlier_estimate_are_other_ones(laboratory, exact, propagation, visit) -> None:
-    effect = stop_repeatability(1.0)
+    effect = effect_kinds.stop_repeatability(1.0)
     further = visit(points=2, orientations=6, seed=5)
     updated = laboratory.updated(exact, further.measured())
     before = propagation.parameter_columns(effect)

@@ -6,14 +6,7 @@ import pytest
 from hexacell.identification.diagnostics.model_tests import update
 from hexacell.identification.estimator import identify
 from hexacell.robot.model import robot_of
-from hexacell.verdict.model_evidence import (
-    BEYOND_CHANCE,
-    CONFIRMING_PROBABILITY,
-    ModelTest,
-    confirmed,
-    fails_narrowly,
-    model_tests,
-)
+from hexacell.verdict import model_evidence
 from tests.hexacell.altered_records import later
 from tests.hexacell.conftest import visits
 
@@ -39,14 +32,14 @@ def measure(noise_mm, after, seed):
 
 def evidence(robot, found, held_out, further):
     first = update(found, robot.problem(held_out))
-    tests = model_tests(found, first)
+    tests = model_evidence.model_tests(found, first)
     both = update(first, robot.problem(further))
-    return tests, confirmed(tests, both, np.isin(both.problem.labels[:, 0], further.points))
+    return tests, model_evidence.confirmed(tests, both, np.isin(both.problem.labels[:, 0], further.points))
 
 
 def test_records_of_the_stated_noise_do_not_confirm_a_failure(robot, found):
     tests, after = evidence(robot, found, measure(NOISIER_MM, 5, 8), measure(NOISE_MM, 8, 11))
-    assert fails_narrowly(tests)
+    assert model_evidence.fails_narrowly(tests)
     assert all(test.passed for test in after)
     (failed,) = [test for test in tests if not test.passed]
     (taken,) = [test for test in after if test.name == failed.name]
@@ -56,26 +49,26 @@ def test_records_of_the_stated_noise_do_not_confirm_a_failure(robot, found):
 
 def test_as_noisy_records_confirm_it(robot, found):
     tests, after = evidence(robot, found, measure(NOISIER_MM, 5, 8), measure(NOISIER_MM, 8, 11))
-    assert fails_narrowly(tests)
+    assert model_evidence.fails_narrowly(tests)
     assert [test.passed for test in after] == [*(test.passed for test in tests), False]
     assert after[-1].probability is not None
-    assert after[-1].probability < CONFIRMING_PROBABILITY
+    assert after[-1].probability < model_evidence.CONFIRMING_PROBABILITY
 
 
 def test_what_is_beyond_chance_is_no_narrow_failure(robot, found):
     first = update(found, robot.problem(measure(3.0 * NOISE_MM, 5, 7)))
-    tests = model_tests(found, first)
+    tests = model_evidence.model_tests(found, first)
     (failed,) = [test for test in tests if not test.passed]
     assert failed.probability is not None
-    assert failed.probability < BEYOND_CHANCE
-    assert not fails_narrowly(tests)
+    assert failed.probability < model_evidence.BEYOND_CHANCE
+    assert not model_evidence.fails_narrowly(tests)
 
 
 def test_tests_that_hold_or_of_old_runs_do_not_fail_narrowly():
-    holds = ModelTest(name="a", passed=True, sentence="A.", probability=0.5)
-    old = ModelTest(name="b", passed=False, sentence="B.")
-    narrow = ModelTest(name="c", passed=False, sentence="C.", probability=1e-4)
-    assert not fails_narrowly([holds])
-    assert not fails_narrowly([holds, old])
-    assert not fails_narrowly([narrow, old])
-    assert fails_narrowly([holds, narrow])
+    holds = model_evidence.ModelTest(name="a", passed=True, sentence="A.", probability=0.5)
+    old = model_evidence.ModelTest(name="b", passed=False, sentence="B.")
+    narrow = model_evidence.ModelTest(name="c", passed=False, sentence="C.", probability=1e-4)
+    assert not model_evidence.fails_narrowly([holds])
+    assert not model_evidence.fails_narrowly([holds, old])
+    assert not model_evidence.fails_narrowly([narrow, old])
+    assert model_evidence.fails_narrowly([holds, narrow])

@@ -15,15 +15,9 @@ from hexacell.cell.loader import Cell
 from hexacell.cell.operation import NotificationSettings, Occasion
 from hexacell.errors import FileError
 from hexacell.runs.run_folder import runs_folder
+from hexacell.services.unattended import outbox
 from hexacell.services.unattended.delivery import NoticeAddress
 from hexacell.services.unattended.notice import Notice, NoticeUndelivered
-from hexacell.services.unattended.outbox import (
-    NoticeOutbox,
-    notify_all,
-    notify_test,
-    send_waiting,
-    waiting_notices,
-)
 from tests.hexacell.services.notify.notices import a_notice
 from tests.hexacell.services.proposed_runs import a_cell
 from tests.waiting import wait_until
@@ -68,30 +62,30 @@ def test_each_is_told_of_what_the_cell_says(tmp_path, post) -> None:
         person("alarms", on=(Occasion.ALARM,)),
         person("bad"),
     )
-    notify_all(cell, now_notice(1, occasions=(Occasion.PASS,)), post)
+    outbox.notify_all(cell, now_notice(1, occasions=(Occasion.PASS,)), post)
     assert post.taken == [("all", "1")]
-    notify_all(cell, now_notice(2, occasions=(Occasion.PASS, Occasion.ALARM)), post)
+    outbox.notify_all(cell, now_notice(2, occasions=(Occasion.PASS, Occasion.ALARM)), post)
     assert sorted(post.taken[1:]) == [("alarms", "2"), ("all", "2"), ("bad", "2")]
-    assert waiting_notices(cell) == ()
+    assert outbox.waiting_notices(cell) == ()
 
 
 def test_who_is_absent_is_told_later_in_order_and_once(tmp_path, post) -> None:
     cell = told_cell(tmp_path)
     post.absent = {"two"}
-    outcome = notify_all(cell, now_notice(1), post)
+    outcome = outbox.notify_all(cell, now_notice(1), post)
     problems = {one.name: (one.sent, one.wait, one.problem) for one in outcome.deliveries}
     assert problems == {"one": (1, 0, None), "two": (0, 1, "does not answer")}
-    notify_all(cell, now_notice(2), post)
-    notify_all(cell, now_notice(2), post)  # the same end told again is one notice
+    outbox.notify_all(cell, now_notice(2), post)
+    outbox.notify_all(cell, now_notice(2), post)  # the same end told again is one notice
     assert post.taken[:2] == [("one", "1"), ("one", "2")]
     post.taken[2:] = []
-    notify_test(cell, a_notice(3, occasions=(Occasion.TEST,)), post)
-    assert len(waiting_notices(cell)) == 2, "a test is not kept"
+    outbox.notify_test(cell, a_notice(3, occasions=(Occasion.TEST,)), post)
+    assert len(outbox.waiting_notices(cell)) == 2, "a test is not kept"
     post.taken[2:] = []
     post.absent = set()
-    assert send_waiting(cell, post).are_all_sent
+    assert outbox.send_waiting(cell, post).are_all_sent
     assert post.taken[2:] == [("two", "1"), ("two", "2")]
-    assert send_waiting(cell, post).deliveries == ()
+    assert outbox.send_waiting(cell, post).deliveries == ()
 
 
 def test_after_a_power_cut_between_telling_and_forgetting_it_is_told_again_with_its_id(
@@ -99,11 +93,11 @@ def test_after_a_power_cut_between_telling_and_forgetting_it_is_told_again_with_
 ) -> None:
     cell = told_cell(tmp_path)
     with monkeypatch.context() as patch:
-        patch.setattr(NoticeOutbox, "forget", Mock(side_effect=FileError("no power")))
-        notify_all(cell, now_notice(1), post)
-    assert send_waiting(cell, post).are_all_sent
+        patch.setattr(outbox.NoticeOutbox, "forget", Mock(side_effect=FileError("no power")))
+        outbox.notify_all(cell, now_notice(1), post)
+    assert outbox.send_waiting(cell, post).are_all_sent
     assert sorted(post.taken) == [("one", "1")] * 2 + [("two", "1")] * 2
-    assert waiting_notices(cell) == ()
+    assert outbox.waiting_notices(cell) == ()
 
 
 def test_who_is_slow_is_waited_for_only_so_long_and_delays_nobody(tmp_path, post, monkeypatch) -> None:
@@ -118,12 +112,12 @@ def test_who_is_slow_is_waited_for_only_so_long_and_delays_nobody(tmp_path, post
             post(address, notice)
 
     monkeypatch.setattr("hexacell.services.unattended.outbox.LONGEST_NOTIFYING_S", 0.2)
-    problems = {one.name: one.problem for one in notify_all(cell, now_notice(1), slow).deliveries}
+    problems = {one.name: one.problem for one in outbox.notify_all(cell, now_notice(1), slow).deliveries}
     assert problems == {"one": "not finished within 0.2 s", "two": None}
-    assert [one.to for one in waiting_notices(cell)] == ["one"]
+    assert [one.to for one in outbox.waiting_notices(cell)] == ["one"]
     answer.set()
     ended.wait()
-    wait_until(lambda: waiting_notices(cell) == ())
+    wait_until(lambda: outbox.waiting_notices(cell) == ())
 
 
 def test_on_a_full_disk_it_is_told_all_the_same(tmp_path, post, monkeypatch) -> None:
@@ -136,28 +130,30 @@ def test_on_a_full_disk_it_is_told_all_the_same(tmp_path, post, monkeypatch) -> 
     with monkeypatch.context() as patch:
         patch.setattr("hexacell.storage.atomic_files.write_atomically", full)
         patch.setattr(Path, "unlink", Mock(side_effect=OSError(errno.EROFS, os.strerror(errno.EROFS))))
-        assert notify_all(cell, now_notice(1), post).are_all_sent
+        assert outbox.notify_all(cell, now_notice(1), post).are_all_sent
         post.absent = {"one"}
-        (told, untold) = sorted(notify_all(cell, now_notice(2), post).deliveries, key=lambda one: -one.sent)
+        (told, untold) = sorted(
+            outbox.notify_all(cell, now_notice(2), post).deliveries, key=lambda one: -one.sent
+        )
     assert (told.name, untold.name, untold.problem) == ("two", "one", "does not answer")
-    assert waiting_notices(cell) == ()
+    assert outbox.waiting_notices(cell) == ()
 
 
 def test_what_is_too_old_is_tried_once_more_and_then_given_up(tmp_path, post) -> None:
     cell = told_cell(tmp_path)
     old = a_notice(1, at=datetime.now(UTC) - timedelta(days=30))
     post.absent = {"one"}
-    outcome = notify_all(cell, old, post)
+    outcome = outbox.notify_all(cell, old, post)
     assert (outcome.dropped, post.taken) == (1, [("two", "1")])
-    assert waiting_notices(cell) == ()
+    assert outbox.waiting_notices(cell) == ()
 
 
 def test_two_processes_do_not_send_at_once(tmp_path, post) -> None:
     cell = told_cell(tmp_path)
     post.absent = {"one", "two"}
-    notify_all(cell, now_notice(1), post)
+    outbox.notify_all(cell, now_notice(1), post)
     post.absent = set()
-    with NoticeOutbox(runs_folder(cell)).held():
-        (problem,) = send_waiting(cell, post).deliveries
+    with outbox.NoticeOutbox(runs_folder(cell)).held():
+        (problem,) = outbox.send_waiting(cell, post).deliveries
     assert problem.problem == "another process is sending at this moment"
     assert post.taken == []

@@ -51,10 +51,9 @@ class BusError(DeviceError):
 
 
 class SilentNodeError(DeviceError):
-    """Encoders, of ``legs`` where known, are silent for longer than the key ``waited_for`` says."""
+    """Encoders, of ``legs`` where known, no longer respond to SYNC or requests, or lack a heartbeat."""
 
     legs: frozenset[int] = frozenset()
-    waited_for = "timeout_s"
 
 
 class RestartedNodeError(DeviceError):

@@ -160,8 +160,7 @@ def search_bus(bus: Mapping[str, Any], timeouts: SearchTimeouts = USUAL) -> BusF
                 ids = responding_nodes(opened, timeouts)
                 nodes = tuple(_described(opened, node, timeouts.node) for node in ids)
             except BusError as error:
-                action = "Check cable and termination, or try another bit rate"
-                action = advice_on(error.__cause__) or action
+                action = advice_on(error.__cause__) or "Check cable and termination; try another bit rate"
                 raise BusError(error.problem, subject=opened.name, action=action) from error
             return BusFindings(bus, nodes, frames_of_no_node(frames, ids))
     except HexacellError as error:

@@ -172,7 +172,7 @@ def explained(error: SilentNodeError, nodes: Sequence[EncoderNode], bus: Encoder
         return silent_nodes(what, silent, THE_BUS)
     if set(named) & set(silent):
         return silent_nodes(f"{error.problem}; the others answer", silent)
-    remedy = THE_BUS if len(named) == len(nodes) else f"Check its supply for a dip, and {error.waited_for}"
+    remedy = THE_BUS if len(named) == len(nodes) else "Check its supply for a dip, timeout_s, heartbeat_ms"
     return silent_nodes(f"{error.problem}, but SDO requests are answered", named, remedy)
 
 

@@ -248,9 +248,7 @@ class DbcSession(BankSession):
         if len(silent) < len(self._signals):
             remedy = "Check its supply and cable, and the message in the DBC file"
             return silent_encoder(f"{what}; others do", subject, remedy)
-        remedy = (
-            "Check the messages in the DBC file" if self._hears_others else f"{THE_BUS}, and the bit rate"
-        )
+        remedy = "Check the messages in the DBC file" if self._hears_others else f"{THE_BUS}, bit rate"
         remedy += ", and request in [encoders.dbc]" * (self._described.request is not None)
         return silent_encoder(what + ", but others do" * self._hears_others, "each encoder", remedy)
 

@@ -48,9 +48,7 @@ _ACTIONS = {
     "81": "Check cable, termination and bit rate of the bus, then open the encoders again",
     "8130": "Open the encoders again; if it stays so, switch its heartbeat consumer (1016h) off",
     "8150": "Give each device on the bus a node id of its own, then open the encoders again",
-    **dict.fromkeys(
-        ("FF00", "m"), "Remove the cause (magnet, distance, dirt, temperature), then measure again"
-    ),
+    **dict.fromkeys(("FF00", "m"), "Remove the cause (magnet, distance, dirt, heat), then measure again"),
     "b": "Change its battery, then open the encoders again",
     "o": "It is old: replace it soon; until then open the encoders again",
     "s": "State a lower speed in [speed], then measure again",
@@ -147,9 +145,7 @@ def check_nodes(monitors: Sequence[NodeMonitor]) -> None:
     silent = [monitor for monitor in monitors if monitor.is_silent(now_s)]
     if silent:
         what = f"no heartbeat for {silent[0].timeout_s:.2g} s"
-        error = silent_nodes(what, [monitor.leg for monitor in silent])
-        error.waited_for = "heartbeat_ms"
-        raise error
+        raise silent_nodes(what, [monitor.leg for monitor in silent])
     for monitor in monitors:
         if monitor.emergency is not None:
             raise invalid_sample(f"reports {monitor.emergency}", monitor.leg.subject, monitor.action)

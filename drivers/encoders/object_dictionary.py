@@ -18,9 +18,6 @@ class ObjectEntry:
         return f"object {self.index:04X}h:{self.subindex}"
 
 
-NMT = 0x000
-
-
 class NmtCommand(IntEnum):
     """NMT commands (CiA 301)."""
 
@@ -58,7 +55,7 @@ class DeviceType(IntEnum):
         return POSITION_OF_MAGNET_1 if self is DeviceType.SEVERAL_MAGNETS else POSITION
 
 
-ENCODER_PROFILE = 406
+ENCODER_PROFILE, NMT = 406, 0x000
 
 DEVICE_TYPE = ObjectEntry(0x1000, 0, 4)
 ERROR_REGISTER = ObjectEntry(0x1001, 0, 1)

@@ -227,7 +227,5 @@ class SyncSampler:
 
     def _on_other_master(self, can_id: int, data: bytearray, _timestamp: float) -> None:
         ours = {0, *(leg.node for leg in self.legs)}
-        if can_id == SYNC:
-            self._other_master = "SYNC"
-        elif data[:1] != bytes([od.NmtCommand.START]) and ours & {*data[1:2]}:
-            self._other_master = "NMT commands that stop encoders"
+        if can_id == SYNC or (data[:1] != bytes([od.NmtCommand.START]) and ours & {*data[1:2]}):
+            self._other_master = "SYNC" if can_id == SYNC else "NMT commands that stop encoders"

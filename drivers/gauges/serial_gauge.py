@@ -257,7 +257,7 @@ class SerialGauge(ABC):
             action = "Switch the gauge on and check that the cable is not looped"
         elif self._state is not None:
             problem += f", where it did: {quoted(self._last_frame)} came last"
-            action = "Look whether it is on, its cable in place, its plunger off an end, timeout_s enough"
+            action = "See that it is on, its cable in place, its plunger off an end, timeout_s long enough"
         else:
             action += "; if it restarts when its port is opened, settle_s there"
         return self._error(GaugeSilent, problem, action)

@@ -74,13 +74,11 @@ class VisaPort(RequestPort):
                 self._resource = self._visa.ResourceManager(backend).open_resource(self.url)
             except Exception as error:  # its backends raise anything, also Exception itself
                 is_library = re.search("install|library|wrapper", str(error), re.IGNORECASE)
-                check = (
-                    "Install what it names, or correct backend" if is_library else "Check it, its rights"
-                )
+                check = "Install what it names, or correct" if is_library else "Check it, its rights and"
                 raise PortLost(
                     f"port {self.url} cannot be opened: {error}",
                     subject=self.subject,
-                    action=f"{check} and port in the cell file",
+                    action=f"{check} port in the cell file",
                 ) from error
             self._opened()
             self._must_clear = False

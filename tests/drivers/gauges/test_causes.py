@@ -170,6 +170,9 @@ PORTS = [
     (OSError(errno.ENOTTY, "Inappropriate ioctl"), "no serial port, or has no control lines"),
     (termios.error(errno.EIO, "Input/output error"), "no device behind it"),
     (serial.SerialException(errno.EAGAIN, "Could not exclusively lock port"), "in use. Close the other"),
+    (serial.SerialException(errno.ENOENT, "reason"), "is absent. Plug it in"),
+    (serial.SerialException(errno.EBUSY, "reason"), "is in use. Close the other program, or ModemManager"),
+    (serial.SerialException(errno.EIO, "reason"), "cannot be opened: it has no device behind it"),
     (OSError(errno.EACCES, "Permission denied"), "may not be opened by this user"),
     (OSError(errno.ECONNREFUSED, "refused"), "no server that answers. Start it, check the network"),
 ]
@@ -184,9 +187,7 @@ def test_why_a_port_cannot_be_opened_is_told(error, told):
 def test_a_port_that_another_program_reads_is_told():
     reason = "device reports readiness to read but returned no data (disconnected or multiple access?)"
     assert "any other program" in str(lost_port("gauge y", "/dev/ttyUSB0", reason))
-    assert "serves no other client" in str(
-        lost_port("gauge y", "socket://host:4001", "socket disconnected")
-    )
+    assert "no other client" in str(lost_port("gauge y", "socket://host:4001", "socket disconnected"))
 
 
 def test_what_came_is_shown_in_part():

@@ -78,22 +78,17 @@ async def test_opening_without_a_listening_server_is_reported():
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
         driver = LinuxcncrshController(ControllerSettings(config="x", port=port))
-        with pytest.raises(
-            ConnectionLost, match=f"127.0.0.1:{port}: cannot be reached: Conn.*Start LinuxCNC"
-        ):
+        with pytest.raises(ConnectionLost, match=f"127.0.0.1:{port}: .* reached: Conn.*Start LinuxCNC"):
             await driver.open()
 
 
-NO_NAME, NO_ROUTE = socket.gaierror(-2, "Name or service not known"), OSError(113, "No route to host")
+HOSTS = [(socket.gaierror(-2, "No such name"), "controller.host"), (OSError(113, ""), "Switch its")]
 
 
-@pytest.mark.parametrize(
-    ("error", "told"),
-    [(NO_NAME, "Name or .*controller.host"), (NO_ROUTE, "No route to host. Switch its computer on")],
-)
+@pytest.mark.parametrize(("error", "told"), HOSTS)
 async def test_a_host_that_cannot_be_reached_is_not_told_as_linuxcnc_that_is_off(monkeypatch, error, told):
     monkeypatch.setattr(asyncio, "open_connection", AsyncMock(side_effect=error))
-    with pytest.raises(ConnectionLost, match=f"cannot be reached: {told}"):
+    with pytest.raises(ConnectionLost, match=f"cannot be reached: No .*{told}"):
         await LinuxcncrshController(ControllerSettings(config="x", host="far", port=5007)).open()
 
 

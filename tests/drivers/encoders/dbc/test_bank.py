@@ -44,7 +44,7 @@ async def test_the_request_is_on_the_wire(settings, wire):
     opening = asyncio.create_task(bank.open())
     message = await asyncio.to_thread(wire.received, 5.0)
     assert (message.arbitration_id, bytes(message.data)) == (0x123, b"\xa0\xb1")
-    with pytest.raises(SilentNodeError):
+    with pytest.raises(SilentNodeError, match=r"bit rate, and request in \[encoders\.dbc\]"):
         await opening
     await bank.close()
 
@@ -72,6 +72,13 @@ async def test_a_bus_without_any_encoder_is_told_and_not_the_first_leg(settings,
         await asyncio.sleep(0)
     with pytest.raises(SilentNodeError, match=f"^each encoder: sends nothing .*{told}"):
         await opening
+
+
+async def test_a_message_that_comes_without_its_signal_is_told_as_that(settings, dbc_file, wire):
+    text = dbc_text().replace("Error :", "Error M :").replace("Position :", "Position m1 :")
+    dbc_file.write_text(text.replace(" SG_ Error", ' SG_ Heat m0 : 0|8@1+ (1,0) [0|0] "" PC\n SG_ Error'))
+    with pytest.raises(SilentNodeError, match=r"leg 6 .*not with this signal. Correct signals"):
+        await while_sending(wire, DbcBank(settings(wire.settings)).open)
 
 
 async def test_a_position_outside_the_range_of_the_file_is_refused(settings, wire):

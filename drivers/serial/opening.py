@@ -21,6 +21,7 @@ from serial.tools.list_ports_common import ListPortInfo
 from drivers.errors import PortLost
 from hexacell.addresses import require_serial_port
 from hexacell.errors import FileError, UsageError
+from hexacell.storage.atomic_files import SHORTAGES
 
 SLICE_S = 0.05
 """Longest wait, s, without a look whether the port is to be closed."""
@@ -34,6 +35,7 @@ _NOT_PERMITTED = ("may not be opened by this user", "Let the user into its group
 _IN_USE = ("is in use", "Close the other program, or ModemManager: docs/howto-host.md")
 _NO_SERVER = ("has no server that answers", "Start it, check the network, or correct port in the cell file")
 _CAUSES = {
+    **{number: (f"cannot be opened: {why}", action) for number, (why, action) in SHORTAGES.items()},
     **dict.fromkeys((errno.ENOENT, errno.ENODEV, errno.ENXIO), _ABSENT),
     **dict.fromkeys((errno.EACCES, errno.EPERM), _NOT_PERMITTED),
     **dict.fromkeys((errno.EBUSY, errno.EAGAIN), _IN_USE),

@@ -16,6 +16,7 @@ from hexacell.cli.console import Console, lost_output, unhindered_output
 from hexacell.cli.process import OVER_A_SOCKET, fault_line, log, require_platform, stop_signals_as_sigint
 from hexacell.errors import ExitCode, HexacellError, UsageError
 from hexacell.printable import PrintableFormatter
+from hexacell.storage.atomic_files import shortage
 from hexacell.storage.output_files import LOG, OutputFile
 
 _log = logging.getLogger(__name__)
@@ -108,7 +109,7 @@ def _require_usable(typed: Sequence[str]) -> None:
 def _unforeseen(error: Exception, typed: Sequence[str], console: Console) -> int:
     from hexacell.plugins import plugin_failure  # noqa: PLC0415 - slow, and only of use here
 
-    if (failed := plugin_failure(error)) is not None:
+    if (failed := plugin_failure(error) or shortage(error)) is not None:
         return _failed(str(failed), failed.exit_code, console)
     return _failed(fault_line(error, typed), ExitCode.FAULT, console)
 

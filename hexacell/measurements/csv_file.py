@@ -36,6 +36,7 @@ MOST_RECORDS = 2000
 """An identification from so many takes a quarter of a minute."""
 
 LARGEST_FILE_BYTES = 5_000_000
+csv.field_size_limit(LARGEST_FILE_BYTES)  # a column that is ignored may hold anything
 
 
 def read_measurements(path: Path, *, allow_partial: bool = False) -> MeasurementSet:
@@ -186,8 +187,12 @@ def _number(path: Path, line: int, name: str, cell: str) -> float:
         number = int(cell) if is_count else float(cell)
     except ValueError:
         number = math.nan
-    # Python accepts underscores in numbers; a CSV file must not have them.
-    if "_" not in cell and (1 <= number <= LARGEST_COUNT if is_count else abs(number) <= LARGEST_NUMBER):
+    # Python accepts underscores and digits of any script in numbers; a CSV file must not have them.
+    if (
+        cell.isascii()
+        and "_" not in cell
+        and (1 <= number <= LARGEST_COUNT if is_count else abs(number) <= LARGEST_NUMBER)
+    ):
         return number
     expected = "a finite number" if math.isnan(number) else f"a finite number within +-{LARGEST_NUMBER:g}"
     if is_count:

@@ -34,7 +34,14 @@ LARGEST_BYTES = 200_000_000
 
 BYTE_ORDER_MARK = "\ufeff"
 
-_REASONS: dict[int, tuple[str, str]] = {
+SHORTAGES = {
+    errno.EMFILE: ("this process may open no more files", "Raise the limit (ulimit -n)"),
+    errno.ENFILE: ("the computer can open no more files", "End other programs"),
+    errno.ENOMEM: ("the memory is used up", "End other programs"),
+}
+"""What the computer lacks, and what to do, whatever file or device is concerned."""
+
+_REASONS: dict[int, tuple[str, str]] = SHORTAGES | {
     errno.ENOENT: ("it does not exist", "Check the path"),
     errno.ENOTDIR: ("a part of the path is not a folder", "Check the path"),
     errno.EISDIR: ("it is a folder", "Name a file"),
@@ -177,6 +184,8 @@ def require_replaceable(path: Path) -> None:
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
         if not os.access(target.parent, os.W_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        if target.stat().st_dev != target.parent.stat().st_dev:
+            raise OSError(errno.EBUSY, os.strerror(errno.EBUSY))
 
 
 def require_creatable(path: Path) -> None:
@@ -219,6 +228,18 @@ def os_error_to_file_error(what: str, path: Path, error: OSError) -> FileError:
     """``error`` in plain words: what failed, with which file, why, and what to do."""
     why, action = _REASONS.get(error.errno or 0, (error.strerror or str(error), "Try again"))
     return FileError(f"{what}: {why}", subject=path, action=action)
+
+
+def shortage(error: Exception) -> FileError | None:
+    """An error that nobody foresaw as what the computer lacks, if it is one of that."""
+    if isinstance(error, FileNotFoundError) and error.filename is None:  # of tempfile
+        action = "Free some space there, or name another folder in TMPDIR"
+        return FileError("there is no folder for temporary files", action=action)
+    number = error.errno if isinstance(error, OSError) else None
+    if number not in {*SHORTAGES, errno.ENOSPC, errno.EDQUOT}:
+        return None
+    why, action = _REASONS[number]
+    return FileError(why, subject=getattr(error, "filename", None), action=action)
 
 
 @contextmanager

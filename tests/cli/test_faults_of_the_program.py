@@ -1,5 +1,6 @@
 """What a person sees where the program fails, or its output cannot be written."""
 
+import errno
 import json
 import os
 import re
@@ -7,6 +8,7 @@ import stat
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -56,6 +58,23 @@ def test_a_fault_gives_a_document_too_and_says_where_no_report_could_be_written(
     assert document["exit_code"] == 70
     assert "this is a fault of the program" in document["error"]
     assert "No report could be written: No such file" in captured.err
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (
+            OSError(errno.EMFILE, "Too many open files", "run.lock"),
+            "run.lock: this process may open no more",
+        ),
+        (OSError(errno.ENOMEM, "Cannot allocate memory"), "the memory is used up. End other"),
+        (FileNotFoundError(errno.ENOENT, "No usable temporary directory found"), "name another folder"),
+    ],
+)
+def test_what_the_computer_lacks_is_no_fault_of_the_program(failing, monkeypatch, capsys, error, told):
+    monkeypatch.setattr(commands, "schema", Mock(side_effect=error))
+    assert app.main(failing) == 2
+    assert told in capsys.readouterr().err
 
 
 def hexacell(*arguments, stdout, **environment):

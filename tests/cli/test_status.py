@@ -115,6 +115,14 @@ def test_a_broken_cell_hides_no_other(typed_here, cell_folder, tmp_path) -> None
         assert ("in_use",) in samples(target)
 
 
+@pytest.mark.parametrize("name", ["new\nline", "\udcff", "/".join("long" for _ in range(250))])
+def test_a_cell_may_be_in_any_folder(typed_here, cell_folder, name) -> None:
+    folder = cell_folder.path.parent / name
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    outcome = typed_here("status", cell_folder.path.rename(folder) / cell_folder.cell.name)
+    assert outcome.code == 0, outcome.err
+
+
 def test_what_a_pattern_names_beside_the_cells_is_passed_over(typed_here, cell_folder) -> None:
     passwords = cell_folder.path / "notify.toml"
     passwords.write_text('token = "hidden"\n')

@@ -17,6 +17,7 @@ from drivers.wire_trace import LineRecord, TraceRecorder, TrafficDirection
 from hexacell.cell.robot import ControllerSettings
 from hexacell.clock import Patience
 from hexacell.errors import DeviceError
+from hexacell.storage.atomic_files import SHORTAGES
 
 _log = logging.getLogger("drivers.controllers.linuxcnc")
 
@@ -307,5 +308,6 @@ async def _connect(
         action = "Switch its computer on, check the network and its firewall, or correct controller.host"
         if number == errno.ECONNREFUSED:
             action = "Start LinuxCNC with DISPLAY = linuxcncrsh --port N, or correct controller.port"
+        action = SHORTAGES.get(number, ("", action))[1]
         problem = f"cannot be reached{reason or f' within {timeouts.connect:g} s'}"
         raise ConnectionLost(problem, subject=protocol.subject_of(settings), action=action) from error

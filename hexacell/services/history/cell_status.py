@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, TypeVar
 
 from pydantic import ValidationError
 
-from hexacell.cell.fields import Frozen, Name, Text
+from hexacell.cell.fields import LONGEST_TEXT, Frozen, Name, Text
 from hexacell.cell.loader import Cell
+from hexacell.printable import printable
 from hexacell.runs.cell_lock import lock_holder
 from hexacell.runs.run_folder import DocumentKind, StampedDocument, runs_folder
 from hexacell.services.history.drift_history import DriftHistory, drift_history
@@ -110,7 +111,7 @@ def cell_status(cell: Cell) -> CellStatus:
     figures = FleetCell(
         name=cell.settings.name,
         host=socket.gethostname(),
-        cell=str(cell.path.absolute()),
+        cell=printable(str(cell.path.absolute())).replace("\n", r"\n")[-LONGEST_TEXT:],
         seen_at=datetime.now(UTC),
         latest_run=latest and latest.name,
         latest_at=summary_of(latest).ended,

@@ -175,6 +175,7 @@ PORTS = [
     (serial.SerialException(errno.EIO, "reason"), "cannot be opened: it has no device behind it"),
     (OSError(errno.EACCES, "Permission denied"), "may not be opened by this user"),
     (OSError(errno.ECONNREFUSED, "refused"), "no server that answers. Start it, check the network"),
+    (OSError(errno.EMFILE, "Too many open files"), "no more files. Raise the limit"),
 ]
 
 

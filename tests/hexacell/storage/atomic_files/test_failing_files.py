@@ -77,6 +77,19 @@ def test_failures_are_reported_in_plain_words(path, monkeypatch, name, code, wor
     assert names(path.parent) == [path.name]
 
 
+def test_a_file_mounted_alone_is_refused_before_a_run_measures(path, monkeypatch) -> None:
+    atomic_files.require_replaceable(path)
+    status_of, target = Path.stat, path.resolve()
+
+    def mounted(one: Path) -> os.stat_result:
+        status = status_of(one)
+        return os.stat_result((*status[:2], status.st_dev + (one == target), *status[3:10]))
+
+    monkeypatch.setattr(Path, "stat", mounted)
+    with pytest.raises(FileError, match="mount point"):
+        atomic_files.require_replaceable(path)
+
+
 def test_a_folder_that_cannot_be_synced_is_reported(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(folder: Path) -> None:
         assert folder == path.parent

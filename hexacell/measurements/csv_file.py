@@ -188,11 +188,8 @@ def _number(path: Path, line: int, name: str, cell: str) -> float:
     except ValueError:
         number = math.nan
     # Python accepts underscores and digits of any script in numbers; a CSV file must not have them.
-    if (
-        cell.isascii()
-        and "_" not in cell
-        and (1 <= number <= LARGEST_COUNT if is_count else abs(number) <= LARGEST_NUMBER)
-    ):
+    is_plain = cell.isascii() and "_" not in cell
+    if is_plain and (1 <= number <= LARGEST_COUNT if is_count else abs(number) <= LARGEST_NUMBER):
         return number
     expected = "a finite number" if math.isnan(number) else f"a finite number within +-{LARGEST_NUMBER:g}"
     if is_count:

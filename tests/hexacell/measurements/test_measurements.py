@@ -134,7 +134,7 @@ MISTAKES = [
     (ROWS[1], ROWS[1].replace("550", "nan"), 'z is "nan", but must be a finite number', 3),
     (ROWS[1], ROWS[1].replace("550", "1e308"), "must be a finite number within .-1e.06", 3),
     (ROWS[1], ROWS[1].replace("550", "5_50"), 'z is "5_50", but must be a finite number', 3),
-    (ROWS[1], ROWS[1].replace("550", "٥٥٠"), "must be a finite number", 3),
+    (ROWS[1], ROWS[1].replace("550", "\u0665\u0665\u0660"), "must be a finite number", 3),
     (ROWS[1], ROWS[1].replace("489.7,0", "489.7,"), "dx is empty, but must be a finite number", 3),
     (ROWS[1], f"1.0,2,{NUMBERS}", 'point is "1.0", but must be a whole number from 1', 3),
     (ROWS[1], f"0,2,{NUMBERS}", 'point is "0", but must be a whole number from 1', 3),

@@ -23,8 +23,13 @@ from hexacell.cell.model import CellSettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
 from hexacell.config.layout import ConfigLayout
-from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.pose import Pose
+
+
+def simulation_of(settings: CellSettings) -> SimulationSettings:
+    """What the cell file states of the simulation: only cells that have it are simulated."""
+    assert settings.simulation is not None  # noqa: S101
+    return settings.simulation
 
 
 class SimulatedSensors(ServedGroup):
@@ -34,14 +39,9 @@ class SimulatedSensors(ServedGroup):
     """
 
     def __init__(
-        self,
-        settings: CellSettings,
-        simulation: SimulationSettings,
-        physics: RobotPhysics,
-        clock: CellClock,
-        *,
-        other_processes: bool,
+        self, settings: CellSettings, physics: RobotPhysics, clock: CellClock, *, other_processes: bool
     ) -> None:
+        simulation = simulation_of(settings)
         with ExitStack() as served:
             plungers = {gauge.name: partial(_plunger_mm, physics, gauge) for gauge in settings.gauges}
             self.gauges = served.enter_context(
@@ -84,9 +84,8 @@ def _station_reach_mm(settings: CellSettings) -> float | None:
 
     However small the machine is, they are moved from one point to the next, and not while they are tried.
     """
-    assert settings.simulation is not None  # noqa: S101 - only such cells are simulated
-    if settings.simulation.station_reach_mm is not None:
-        return settings.simulation.station_reach_mm
+    if (stated := simulation_of(settings).station_reach_mm) is not None:
+        return stated
     points = np.array([*settings.identification.points, *settings.verification.points])
     apart = np.linalg.norm(points[:, None] - points, axis=-1)
     nearest = np.min(apart, where=apart > 0.0, initial=np.inf)
@@ -108,19 +107,14 @@ class SimulatedCell(ServedGroup):
     """
 
     def __init__(
-        self,
-        settings: CellSettings,
-        simulation: SimulationSettings,
-        mechanism: Mechanism,
-        layout: ConfigLayout,
-        config: tuple[Path, ...],
-        *,
-        other_processes: bool,
+        self, settings: CellSettings, config: tuple[Path, ...], *, other_processes: bool = False
     ) -> None:
+        simulation, layout = simulation_of(settings), ConfigLayout.of(settings)
         clock = CellClock(settings.timing.clock_factor)
         home = Pose(*settings.identification.points[0])
         commanding, fixture = layout.read(*config), settings.length_check
         simulated = simulation.model_copy(update={"station_reach_mm": _station_reach_mm(settings)})
+        mechanism = settings.mechanism
         self.physics = RobotPhysics(mechanism, simulated, clock, commanding, home, fixture)
         self.machine = SimulatedMachine(
             mechanism,
@@ -138,7 +132,7 @@ class SimulatedCell(ServedGroup):
             else:  # one in a temporary folder that is removed at the end
                 stop_file = Path(served.enter_context(TemporaryDirectory(prefix="hexacell-"))) / "stop"
             sensors = served.enter_context(
-                SimulatedSensors(settings, simulation, self.physics, clock, other_processes=other_processes)
+                SimulatedSensors(settings, self.physics, clock, other_processes=other_processes)
             )
             self.gauges, self.encoders = sensors.gauges, sensors.encoders
             self.controller = served.enter_context(SimulatedController(self.machine, settings.controller))

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from drivers.simulated.cell import SimulatedSensors
+from drivers.simulated.cell import SimulatedSensors, simulation_of
 from drivers.simulated.physics import Motion, RobotPhysics
 from drivers.simulated.served_device import Closeable, ServedGroup
 from hexacell.cell.model import CellSettings
@@ -21,7 +21,6 @@ from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
 from hexacell.config.layout import ConfigLayout, fingerprint
 from hexacell.errors import FileError, UsageError
-from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
@@ -122,18 +121,14 @@ class FollowingPhysics(RobotPhysics):
             self._follow(shown / self._shown_per_mm, now)
             if self._is_first:  # before, the ball was at the first point for want of anything better
                 self._is_first = False
-                self._restore_gauges()
+                with suppress(OSError, FileError, ValueError, KeyError, TypeError):
+                    kept = json.loads(read_bytes(self._kept))
+                    if kept["config"] == fingerprint(*self._config):
+                        station, triad = np.array(kept["station"], float), np.array(kept["triad"], float)
+                        self.gauges.stand(station.reshape(3), triad.reshape(3, 3))
+                self.gauges.on_placed = self._keep_gauges
         self._move_platform(self._motion.path[-1])  # it may be warmer
         return now
-
-    def _restore_gauges(self) -> None:
-        """Put the gauges where they were, if that is known, and note from now on where they are put."""
-        with suppress(OSError, FileError, ValueError, KeyError, TypeError):
-            kept = json.loads(read_bytes(self._kept))
-            if kept["config"] == fingerprint(*self._config):
-                station, triad = np.array(kept["station"], float), np.array(kept["triad"], float)
-                self.gauges.stand(station.reshape(3), triad.reshape(3, 3))
-        self.gauges.on_placed = self._keep_gauges
 
     def _keep_gauges(self, station: Array, triad: Array) -> None:
         with suppress(FileError):  # a folder that cannot be written is no reason to have no gauges
@@ -169,15 +164,9 @@ class FollowedController(ServedGroup):
     """
 
     def __init__(
-        self,
-        settings: CellSettings,
-        simulation: SimulationSettings,
-        mechanism: Mechanism,
-        layout: ConfigLayout,
-        config: tuple[Path, ...],
-        *,
-        other_processes: bool,
+        self, settings: CellSettings, config: tuple[Path, ...], *, other_processes: bool = False
     ) -> None:
+        simulation, layout = simulation_of(settings), ConfigLayout.of(settings)
         _require_real(settings, simulation)
         clock = CellClock(1.0)
         home = Pose(*settings.identification.points[0])
@@ -185,10 +174,10 @@ class FollowedController(ServedGroup):
         with ExitStack() as served:
             source = served.enter_context(JointSource(simulation.joints_command))
             self.physics = FollowingPhysics(
-                source, config, mechanism, simulation, clock, commanding, home, fixture
+                source, config, settings.mechanism, simulation, clock, commanding, home, fixture
             )
             self.sensors = served.enter_context(
-                SimulatedSensors(settings, simulation, self.physics, clock, other_processes=other_processes)
+                SimulatedSensors(settings, self.physics, clock, other_processes=other_processes)
             )
             self._served = served.pop_all()
         self.settings = self.sensors.addressed(settings)

@@ -25,7 +25,6 @@ from hexacell.cell.measuring import GuardSettings
 from hexacell.cell.simulation import FaultKind, SimulatedFault
 from hexacell.clock import CellClock
 from hexacell.config.layout import CurrentConfig
-from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose
 from hexacell.services.devices.device_setup import devices_of
 from procedures.devices.device_set import Devices
@@ -97,10 +96,7 @@ async def watched(folder: Path, protocol: str) -> AsyncIterator[Watched]:
         shutil.copy(path, folder)
     cell = load_cell(folder / source.name)
     settings = settings_of(cell, protocol)
-    served = SimulatedCell(
-        settings, settings.simulation, Hexaglide(), NATIVE, cell.config_paths, other_processes=False
-    )
-    with served as simulated:
+    with SimulatedCell(settings, cell.config_paths) as simulated:
         links = SharedSerialPorts()
         devices = devices_of(simulated.settings, links, WireTrace(), folder)
         try:

@@ -57,15 +57,13 @@ async def test_joints_reach_the_same_place_from_either_side(compensating, monkey
         monkeypatch.setenv(name, value)
     cell = load_cell(compensating.folder / "cell.toml")
     settings, layout = cell.settings, ConfigLayout.of(cell.settings)
-    assert settings.simulation is not None
     commanding = layout.read(*cell.config_paths)
     there = PoseBatch.of([THERE])
     joints = inverse_kinematics(settings.mechanism, commanding.geometry, commanding.branch, there)[0]
     controller = LinuxcncrshController(settings.controller)
     await controller.open()
     await controller.prepare(frozenset(StartupAction))
-    arguments = (settings, settings.simulation, settings.mechanism, layout, cell.config_paths)
-    with FollowedController(*arguments, other_processes=False) as simulated:
+    with FollowedController(settings, cell.config_paths) as simulated:
         physics = simulated.physics
         for way in (-30.0, 30.0):
             await controller.move(Pose(THERE.x + way, THERE.y, THERE.z), 0.5)

@@ -39,14 +39,7 @@ def device_addresses(cell: Cell, *, other_processes: bool = False) -> Iterator[C
     from drivers.simulated.followed_controller import FollowedController  # noqa: PLC0415
 
     kind = FollowedController if settings.simulation.joints_command else SimulatedCell
-    with kind(
-        settings,
-        settings.simulation,
-        settings.mechanism,
-        ConfigLayout.of(settings),
-        cell.config_paths,
-        other_processes=other_processes,
-    ) as simulated:
+    with kind(settings, cell.config_paths, other_processes=other_processes) as simulated:
         yield simulated.settings
 
 

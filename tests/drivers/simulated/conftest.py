@@ -117,9 +117,7 @@ def bundled_cell(tmp_path: Path) -> Cell:
 
 def served(bundled_cell: Cell, settings: CellSettings) -> SimulatedCell:
     """The simulated devices of these settings, with the config of the bundled cell."""
-    assert settings.simulation is not None
-    config = (bundled_cell.config_path,)
-    return SimulatedCell(settings, settings.simulation, Hexaglide(), NATIVE, config, other_processes=False)
+    return SimulatedCell(settings, (bundled_cell.config_path,))
 
 
 @pytest.fixture

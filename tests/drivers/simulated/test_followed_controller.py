@@ -64,9 +64,7 @@ def followed(bundled_cell):
             cell.settings,
             {"timing.clock_factor": 1.0, "simulation.joints_command": printing(joints, 0.4)} | changes,
         )
-        assert settings.simulation is not None
-        arguments = (settings, settings.simulation, Hexaglide(), form, cell.config_paths)
-        opened.append(FollowedController(*arguments, other_processes=False))
+        opened.append(FollowedController(settings, cell.config_paths))
         return opened[-1], joints
 
     yield follow

@@ -11,7 +11,6 @@ import pytest
 
 from drivers.simulated.cell import SimulatedCell
 from hexacell.cell.loader import Cell, load_cell
-from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.run.calibration_run import RunRequest, calibrate
 from procedures.calibration.calibration import Mode
@@ -22,7 +21,6 @@ from procedures.run.questions import Question
 from procedures.steps import events
 from tests.hexacell.services.proposed_runs import a_cell
 from tests.made_once import made_once
-from tests.native_config import NATIVE
 from tests.small_cell import SMALL, few_candidates, history_until, write_small_cell
 
 SERVED: dict[str, Any] = {
@@ -155,14 +153,7 @@ def make_site(make_cell: MakeCell, tmp_path: Path) -> Iterator[Callable[..., Sit
     def make(**changes: Any) -> Site:
         cell = make_cell(**changes)
         assert cell.settings.simulation is not None
-        simulated = SimulatedCell(
-            cell.settings,
-            cell.settings.simulation,
-            Hexaglide(),
-            NATIVE,
-            cell.config_paths,
-            other_processes=False,
-        )
+        simulated = SimulatedCell(cell.settings, cell.config_paths)
         served.append(simulated)
         return Site(cell, RunFolder(tmp_path / "run"), simulated)
 

@@ -15,8 +15,6 @@ Lengths are mm, angles in files deg. Errors are :class:`HexacellError`, with a m
 next action. Nothing here moves a robot.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING
 

@@ -15,14 +15,12 @@ def printable(text: str) -> str:
     if text.isprintable():
         return text
     lines = text.replace("\r\n", "\n").expandtabs(TAB_COLUMNS)
-    return "".join(sign if sign == "\n" or _is_seen(sign) else _escape(sign) for sign in lines)
+    return "".join(map(_seen, lines))
 
 
-def _is_seen(sign: str) -> bool:
-    return sign.isprintable() or category(sign) == "Zs"
-
-
-def _escape(sign: str) -> str:
+def _seen(sign: str) -> str:
+    if sign == "\n" or sign.isprintable() or category(sign) == "Zs":
+        return sign
     return f"\\u{ord(sign):04x}" if ord(sign) <= 0xFFFF else f"\\U{ord(sign):08x}"
 
 

@@ -53,6 +53,7 @@ Escalation = tuple[Word, ...]
 _ASK: tuple[Word, ...] = ("ask",)
 _ABORT: tuple[Word, ...] = ("abort",)
 _REDO: tuple[Word, ...] = ("redo-set", "redo-set", "abort")
+_AGAIN: tuple[Word, ...] = ("measure-again", "measure-again", "abort")
 
 
 class Escalations(Section):
@@ -106,17 +107,11 @@ class UnattendedRecovery(Escalations):
         ("retry", "measure-again", "redo-set", "abort"), "the readings did not settle"
     )
     zero_void: Escalation = key(_REDO, "a gauge was switched off or set differently")
-    encoder_silent: Escalation = key(
-        ("retry", "measure-again", "measure-again", "abort"), "a round was not complete"
-    )
-    encoder_alarm: Escalation = key(
-        ("measure-again", "measure-again", "abort"), "an encoder reports an error"
-    )
+    encoder_silent: Escalation = key(("retry", *_AGAIN), "a round was not complete")
+    encoder_alarm: Escalation = key(_AGAIN, "an encoder reports an error")
     encoder_restarted: Escalation = key(_REDO, "an encoder lost its configuration")
     controller: Escalation = key(_ABORT, "the controller refused, or stopped at another place")
-    link_lost: Escalation = key(
-        ("measure-again", "measure-again", "measure-again", "abort"), "a cable or connection broke"
-    )
+    link_lost: Escalation = key(("measure-again", *_AGAIN), "a cable or connection broke")
     drift: Escalation = key(_REDO, "the reference is beyond acceptance.drift_mm at the end")
     no_way: Escalation = key(("redo-set", "abort"), "no safe path")
     guard: Escalation = key(_ABORT, "a guard tripped")

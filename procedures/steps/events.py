@@ -5,8 +5,6 @@ are the events that are no outcome of a step: how a run begins, is interrupted, 
 imported, so that this is the namespace in which other packages name all of them.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self, Union

@@ -82,7 +82,9 @@ class LoadedMachine:
             if not found.found[0]:
                 return found
             start = found.poses
-            step = self._stretched(geometry, joints, start) - longer
+            tension = leg_tensions(self._mechanism, geometry, start, joints, self._load)[0]
+            seated = np.clip(tension / SEATED_N, -1.0, 1.0)
+            step = np.asarray(0.5 * self._play_mm * seated + self._mm_n * tension) - longer
             if np.abs(step).max() < BALANCED_MM:
                 break
             if before @ step < 0.0 and np.abs(step).max() > 0.5 * np.abs(before).max():
@@ -108,12 +110,6 @@ class LoadedMachine:
         geometry = Geometry(parameters, self._geometry.vector * (1.0 + grown))
         is_linear = self._mechanism.words.joint_unit is JointUnit.MM
         return geometry, joints * (1.0 + growth[MachinePart.BASE]) if is_linear else joints
-
-    def _stretched(self, geometry: Geometry, joints: Array, poses: PoseBatch) -> Array:
-        """By how much each leg (6,) is longer under the forces at a pose, mm."""
-        tension = leg_tensions(self._mechanism, geometry, poses, joints, self._load)[0]
-        seated = np.clip(tension / SEATED_N, -1.0, 1.0)
-        return np.asarray(0.5 * self._play_mm * seated + self._mm_n * tension)
 
 
 def leg_tensions(

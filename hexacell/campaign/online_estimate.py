@@ -160,21 +160,14 @@ def update_estimate(
     # Residuals that the noise does not explain are a reason to choose terms, or others.
     is_due = bool(found.problem.offered) and found.records >= RECORDS_FACTOR * before.terms_tried
     if is_due and found.noise_test.agreement is ChiSquareVerdict.TOO_LARGE:
-        return _with_terms(problem, found)
+        # While records do not tell which of them the robot has, it may have all: less is known of it than
+        # its records seem to say, and poses keep more of the gauges' travel.
+        chosen = choose_terms(found).taken or found.problem.offered
+        nearly = estimate_online(problem.started_at(found.free).with_terms(chosen))
+        better = estimate_online(with_terms_of(problem, nearly))
+        return ChainedEstimate(better, terms=chosen, terms_tried=problem.records)
     following = _following(problem, kept, found, before, tries_others=tries_others)
     return replace(following, terms=before.terms, terms_tried=before.terms_tried)
-
-
-def _with_terms(problem: Problem, found: Identification) -> ChainedEstimate:
-    """The estimate with the terms that the records show.
-
-    While records do not tell which of them the robot has, it may have all: less is known of it than its
-    records seem to say, and poses keep more of the gauges' travel.
-    """
-    chosen = choose_terms(found).taken or found.problem.offered
-    nearly = estimate_online(problem.started_at(found.free).with_terms(chosen))
-    better = estimate_online(with_terms_of(problem, nearly))
-    return ChainedEstimate(better, terms=chosen, terms_tried=problem.records)
 
 
 def _following(

@@ -91,7 +91,9 @@ class Diagnosis:
         return errors
 
     def _explain_one(self, path: KeyPath, kind: str, context: Mapping[str, Any]) -> FileError:
-        length = self._length_at(path)
+        annotation = self._annotation_at(path)
+        items = get_args(annotation) if get_origin(annotation) is tuple else ()
+        length = len(items) if items and items[-1] is not Ellipsis else None
         if length is not None and kind in {"too_few", "too_long", "tuple_type"}:
             is_of_sections = self._section_at((*path, 0)) is not None
             each = f"sections, each beginning with {self._header(path)}"
@@ -146,12 +148,6 @@ class Diagnosis:
         """The model of the section at ``path``; None if no section belongs there."""
         annotation = self._annotation_at(path)
         return annotation if isinstance(annotation, type) and issubclass(annotation, Section) else None
-
-    def _length_at(self, path: KeyPath) -> int | None:
-        """The length of the list at ``path``; None if any length is allowed or no list belongs there."""
-        annotation = self._annotation_at(path)
-        items = get_args(annotation) if get_origin(annotation) is tuple else ()
-        return len(items) if items and items[-1] is not Ellipsis else None
 
     def _description_at(self, path: KeyPath) -> str | None:
         """The description of the key at ``path``, or of the key whose list contains ``path``."""

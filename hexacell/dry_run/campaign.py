@@ -75,7 +75,11 @@ class VirtualCampaign:
                 self._go_to_point(decision)
                 self.virtual_robot.zero_gauges()
                 self._measure(decision)
-                self._take_pilots()
+                # As to measure the noise, it leaves the first reference for pilot poses and comes back.
+                reference = self.state.present
+                while reference is not None and self._depart():
+                    self._return_to(reference)
+                    self.state = replace(self.state, present=reference)
             case MeasurePose():
                 self._go_to_pose(decision)
                 self._measure(decision)
@@ -84,13 +88,6 @@ class VirtualCampaign:
             case Finished(reason=reason):
                 self.reason = reason
         return decision
-
-    def _take_pilots(self) -> None:
-        """Leave the first reference, as to measure the noise, for pilot poses, and come back."""
-        reference = self.state.present
-        while reference is not None and self._depart():
-            self._return_to(reference)
-            self.state = replace(self.state, present=reference)
 
     def _depart(self) -> bool:
         """Visit the pilot poses of one departure; whether there is any."""

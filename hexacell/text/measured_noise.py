@@ -55,17 +55,12 @@ def _summary(measured: MeasuredNoise) -> Iterator[str]:
             f"scatter {approaches.ratio:.1f} times as much"
         )
     if approaches is not None and approaches.stops:
-        yield _stops(approaches)
-
-
-def _stops(approaches: RepeatedApproaches) -> str:
-    """How far joints stop beside their commands, and what a run makes of it."""
-    size = f"{_number(approaches.stops)} {approaches.stop_unit.thousandth}"
-    return (
-        f"  each joint stops {size} (one sigma) beside its command, as its encoder shows: the ball by "
-        f"{shown(approaches.ball_mm)}. The records know it; the robot at work errs by it, and no geometry "
-        "corrects that"
-    )
+        size = f"{_number(approaches.stops)} {approaches.stop_unit.thousandth}"
+        yield (
+            f"  each joint stops {size} (one sigma) beside its command, as its encoder shows: the ball by "
+            f"{shown(approaches.ball_mm)}. The records know it; the robot at work errs by it, and no "
+            "geometry corrects that"
+        )
 
 
 def _of_each_kind(measured: MeasuredNoise, figure: str) -> str:

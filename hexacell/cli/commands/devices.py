@@ -51,7 +51,9 @@ def _set_node(options: argparse.Namespace, console: Console) -> ExitCode:
 
 def _search(options: argparse.Namespace, console: Console) -> ExitCode:
     if options.write is not None:
-        _require_creatable(options.write.path)
+        require_creatable(options.write.path)
+        if not is_interactive():
+            raise AnswerNeeded("--write asks what no device reports", action="Start it at a terminal")
     buses = [_bus(words) for words in options.can]
     address = _address(options.controller)
     found = asyncio.run(search_devices(options.ports, buses, address))
@@ -64,12 +66,6 @@ def _search(options: argparse.Namespace, console: Console) -> ExitCode:
     if text:
         console.print(f"\nFor your cell file:\n\n{text}")
     return ExitCode.DONE
-
-
-def _require_creatable(path: Path) -> None:
-    require_creatable(path)
-    if not is_interactive():
-        raise AnswerNeeded("--write asks what no device reports", action="Start it at a terminal")
 
 
 def _write(found: SearchFindings, path: Path, console: Console) -> ExitCode:

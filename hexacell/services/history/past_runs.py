@@ -161,17 +161,14 @@ def delete_runs(cell: Cell, runs: Sequence[PastRun]) -> None:
         for run in runs:
             present = now.get(run.name)
             if present is not None and reason_to_keep(present) is None:
-                _delete(run.folder.path)
+                # In one step for all who list runs: half deleted it would be a damaged run.
+                path = run.folder.path
+                leaving = path.with_name(f"{LEAVING}{path.name}")
+                with os_errors("cannot be deleted", path):
+                    path.rename(leaving)
+                _remove(leaving)
         for rest in runs_folder(cell).glob(f"{LEAVING}*"):
             _remove(rest)
-
-
-def _delete(path: Path) -> None:
-    """Delete a folder in one step for all who list runs: half deleted it would be a damaged run."""
-    leaving = path.with_name(f"{LEAVING}{path.name}")
-    with os_errors("cannot be deleted", path):
-        path.rename(leaving)
-    _remove(leaving)
 
 
 def _remove(path: Path) -> None:

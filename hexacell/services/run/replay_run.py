@@ -9,9 +9,8 @@ from tempfile import TemporaryDirectory
 from hexacell.cell.by_mechanism import geometry_settings
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.measuring import IdentificationSettings
-from hexacell.cell.model import CellSettings
 from hexacell.config.change import BEFORE, ConfigChange, kept_paths
-from hexacell.config.layout import Contents, fingerprint_of, read_contents_if_present
+from hexacell.config.layout import fingerprint_of, read_contents_if_present
 from hexacell.errors import FileError, HexacellError
 from hexacell.runs.run_folder import CELL_FILE, RunFolder
 from hexacell.services.history.journal_soundness import require_sound
@@ -54,7 +53,10 @@ def _set_up(
     """The procedure with recorded devices, and the run's start with the config of the temporary folder."""
     cell = _cell(scratch, started, folder.journal)
     require_sound((entry.event for entry in entries), cell.settings, folder.journal)
-    contents = _config_contents(folder, started, len(cell.config_paths))
+    kept = read_contents_if_present(kept_paths(folder.path, BEFORE, len(cell.config_paths)))
+    if kept is None and folder.proposal.is_file():
+        kept = ConfigChange.load(folder.proposal).before_contents
+    contents = kept if kept is not None and fingerprint_of(kept) == started.config_sha256 else None
     # The files of its config are beside the cell file, under names of their own.
     controller = cell.settings.controller
     further = (
@@ -67,7 +69,10 @@ def _set_up(
     if contents is None:
         native = {"config_format": "toml", "config_options": {}, "further_files": ()}
         settings = settings.model_copy(update={"controller": controller.model_copy(update=native)})
-        contents = (_native_config(settings, started),)
+        parameters = settings.mechanism.parameters
+        geometry = dump(geometry_settings(parameters).model_validate(started.controller))
+        branch = f"branch = {list(started.branch)}\n" if started.branch else ""
+        contents = (f"[geometry]\n{geometry}{branch}".encode(),)
     cell = replace(cell, settings=settings)
     for path, data in zip(cell.config_paths, contents, strict=True):
         path.write_bytes(data)
@@ -103,19 +108,3 @@ def _identification(cell: Cell, started: RunStarted) -> IdentificationSettings:
         return plan
     (cell.path.parent / POSES).write_text(started.pose_list, encoding="utf-8")
     return plan.model_copy(update={"poses": POSES})
-
-
-def _config_contents(folder: RunFolder, started: RunStarted, count: int) -> Contents | None:
-    """What the files of the controller's config held at the start of the run, if the run folder kept it."""
-    kept = read_contents_if_present(kept_paths(folder.path, BEFORE, count))
-    if kept is None and folder.proposal.is_file():
-        kept = ConfigChange.load(folder.proposal).before_contents
-    return kept if kept is not None and fingerprint_of(kept) == started.config_sha256 else None
-
-
-def _native_config(settings: CellSettings, started: RunStarted) -> bytes:
-    """A config in the native format with the geometry that commanded the run."""
-    parameters = settings.mechanism.parameters
-    geometry = dump(geometry_settings(parameters).model_validate(started.controller))
-    branch = f"branch = {list(started.branch)}\n" if started.branch else ""
-    return f"[geometry]\n{geometry}{branch}".encode()

@@ -18,7 +18,6 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from importlib.util import find_spec
-from pathlib import Path
 from types import FrameType
 
 from hexacell import __version__
@@ -81,19 +80,14 @@ def fault_line(error: Exception, typed: Sequence[str]) -> str:
     what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     line = f"this is a fault of the program: {' '.join(what.split())}"
     try:
-        kept = _keep(error, typed)
+        handle, name = tempfile.mkstemp(prefix="hexacell-fault-", suffix=".txt")
+        head = f"hexacell {__version__}, Python {platform.python_version()}, {platform.platform()}\n"
+        head += f"hexacell {shlex.join(typed)}\n"
+        with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as report:
+            report.write(printable(head + "".join(traceback.format_exception(error))))
     except OSError as refusal:
         return f"{line}. No report could be written: {refusal.strerror}"
-    return f"{line}. Please report it with {kept}"
-
-
-def _keep(error: Exception, typed: Sequence[str]) -> Path:
-    handle, name = tempfile.mkstemp(prefix="hexacell-fault-", suffix=".txt")
-    head = f"hexacell {__version__}, Python {platform.python_version()}, {platform.platform()}\n"
-    command = f"hexacell {shlex.join(typed)}\n"
-    with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as report:
-        report.write(printable(head + command + "".join(traceback.format_exception(error))))
-    return Path(name)
+    return f"{line}. Please report it with {name}"
 
 
 def require_platform(target: str) -> None:

@@ -195,7 +195,14 @@ class TerminalOperator:
         termios.tcflush(sys.stdin, termios.TCIFLUSH)
         self._console.prompt(question)
         try:
-            line = await _line(sys.stdin)
+            # No thread waits for the line: Ctrl-C would have to wait for that thread.
+            loop, typed = asyncio.get_running_loop(), asyncio.Event()
+            loop.add_reader(sys.stdin, typed.set)
+            try:
+                await typed.wait()
+            finally:
+                loop.remove_reader(sys.stdin)
+            line = sys.stdin.readline()
         except asyncio.CancelledError:
             self._console.prompt("\n")
             raise
@@ -205,18 +212,6 @@ class TerminalOperator:
             self._console.prompt("\n")
             raise AnswerNeeded("the question was left without an answer", action="Run it at a terminal")
         return line
-
-
-async def _line(terminal: TextIO) -> str:
-    """The next line; no thread waits for it, since Ctrl-C would have to wait for that thread."""
-    loop = asyncio.get_running_loop()
-    typed = asyncio.Event()
-    loop.add_reader(terminal, typed.set)
-    try:
-        await typed.wait()
-    finally:
-        loop.remove_reader(terminal)
-    return terminal.readline()
 
 
 def question_text(view: QuestionView) -> str:

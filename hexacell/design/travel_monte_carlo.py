@@ -200,7 +200,14 @@ class _Scenario:
             more = self.sampled(variates, possible)
             robots = more if robots is None else _SampledRobots.joined([robots, more])
             spread = self.chance_spread(possible)
-            within = _nearly_all_within(robots, self.belief.limits, spread, UNCERTAIN_SHARE)
+            # All but the worst stay within a share of the room; the legs of all that take it are free.
+            limits = self.belief.limits
+            stay = robots.found & limits.within_travel(robots.deviations, share=UNCERTAIN_SHARE)
+            stay &= limits.within_travel(robots.deviations, spread, TRAVEL_SHARE)
+            are_free = (robots.leg_margins >= 0.0).all(axis=-1)
+            within = np.asarray(
+                (np.count_nonzero(~stay, axis=0) <= 1) & (are_free | ~robots.found).all(axis=0)
+            )
             possible, robots = possible[within], robots[:, within]
         holds = np.zeros(len(self.joints) - 1, dtype=bool)
         holds[possible] = robots is not None and len(robots) >= FEWEST_SAMPLES
@@ -246,17 +253,6 @@ class _Scenario:
             deviations=positions[:, 1:] - positions[:, :1],
             leg_margins=leg_margins.reshape(*shape, -1)[kept, 1:],
         )
-
-
-def _nearly_all_within(sampled: _SampledRobots, limits: Limits, spread: Array, share: float) -> Mask:
-    """At which targets all sampled robots but the worst stay within a share of the gauges' room.
-
-    The ``spread`` (n, 3), mm, is of their stops. Of all that take the target the legs are free.
-    """
-    stay = sampled.found & limits.within_travel(sampled.deviations, share=share)
-    stay &= limits.within_travel(sampled.deviations, spread, TRAVEL_SHARE)
-    are_free = (sampled.leg_margins >= 0.0).all(axis=-1)
-    return np.asarray((np.count_nonzero(~stay, axis=0) <= 1) & (are_free | ~sampled.found).all(axis=0))
 
 
 def _all_within(sampled: _SampledRobots, limits: Limits, stops: Array, share: float) -> Mask:

@@ -88,16 +88,12 @@ def as_written(
     )
     moved = TaskDisplacement.of(choice.displacement, settings.acceptance)
     if corrections is not None and (corrections.play_mm, corrections.compliance_um_n) != (NONE, NONE):
-        corrections = _in_frames_of(choice.geometry, robot, corrections)
+        # Their weight is stated in the drawing's frames.
+        drawn, own = (robot.mechanism.normalize_frames(one)[1] for one in (robot.drawing, choice.geometry))
+        x, y, z = (own.base.T @ drawn.base @ corrections.weight_direction).round(9).tolist()
+        centre = corrections.weight_centre_mm
+        if centre is not None:
+            u, v, w = (own.platform.T @ drawn.platform @ centre).round(6).tolist()
+            centre = u, v, w
+        corrections = replace(corrections, weight_direction=(x, y, z), weight_centre_mm=centre)
     return WrittenGeometry(choice.geometry, moved, corrections)
-
-
-def _in_frames_of(written: Geometry, robot: Robot, corrections: Corrections) -> Corrections:
-    """Corrections whose weight is stated in the drawing's frames, in those of a written geometry."""
-    drawn, own = (robot.mechanism.normalize_frames(one)[1] for one in (robot.drawing, written))
-    x, y, z = (own.base.T @ drawn.base @ corrections.weight_direction).round(9).tolist()
-    centre = corrections.weight_centre_mm
-    if centre is not None:
-        u, v, w = (own.platform.T @ drawn.platform @ centre).round(6).tolist()
-        centre = u, v, w
-    return replace(corrections, weight_direction=(x, y, z), weight_centre_mm=centre)

@@ -87,7 +87,11 @@ class RecordedRun:
                 yield protocol.EventRecorded(sequence=sent, at=entry.at, event=entry.event)
             for message in self._present(sent):
                 yield message
-            await self._until_moved(sent)
+            advancing = asyncio.ensure_future(self._advance(sent))
+            try:
+                await self._moved.wait()
+            finally:
+                advancing.cancel()
 
     async def give(self, command: Command) -> None:
         """Refused: raises ``UsageError``."""
@@ -122,23 +126,12 @@ class RecordedRun:
         asked = protocol.QuestionChanged(question=question)
         return [protocol.StatusChanged(status=status), asked, at_cursor]
 
-    async def _until_moved(self, sent: int) -> None:
-        advancing = asyncio.ensure_future(self._advance(sent))
-        try:
-            await self._moved.wait()
-        finally:
-            advancing.cancel()
-
     async def _advance(self, sent: int) -> None:
         if self._speed and sent < self.last:
-            await self._clock.sleep(self._wait_s(sent) / self._speed)
+            here, following = self._entries[sent - 1], self._entries[sent]
+            elapsed = following.monotonic_s - here.monotonic_s
+            if elapsed < 0.0:  # the machine was restarted
+                elapsed = (following.at - here.at).total_seconds()
+            await self._clock.sleep(min(max(elapsed, 0.0), LONGEST_WAIT_S) / self._speed)
             if self._sequence == sent:
                 self.jump(sent + 1)
-
-    def _wait_s(self, sent: int) -> float:
-        """The recorded time from one event to the next, s."""
-        here, following = self._entries[sent - 1], self._entries[sent]
-        elapsed = following.monotonic_s - here.monotonic_s
-        if elapsed < 0.0:  # the machine was restarted
-            elapsed = (following.at - here.at).total_seconds()
-        return min(max(elapsed, 0.0), LONGEST_WAIT_S)

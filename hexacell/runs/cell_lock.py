@@ -66,7 +66,15 @@ def cell_lock(*config: Path) -> Iterator[None]:
 def _lock_of_file(config: Path) -> Iterator[None]:
     descriptor = _open(lock_path(config))
     try:
-        _acquire(descriptor, config)
+        with atomic_files.os_errors("the cell cannot be locked", config):
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                raise CellBusy(
+                    f"the cell is in use by {_holder(descriptor)}",
+                    subject=config,
+                    action="Wait until that has ended, or stop it",
+                ) from error
         since = datetime.now(UTC).astimezone().isoformat(timespec="seconds")  # local time
         holder = {"pid": os.getpid(), "user": user_name(), "host": socket.gethostname(), "since": since}
         try:
@@ -156,18 +164,6 @@ def _cannot_open(path: Path, error: OSError) -> FileError:
     if isinstance(error, PermissionError):
         plain.action = "Have the owner of the folder create it once, empty, with mode 644"
     return plain
-
-
-def _acquire(descriptor: int, config: Path) -> None:
-    with atomic_files.os_errors("the cell cannot be locked", config):
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise CellBusy(
-                f"the cell is in use by {_holder(descriptor)}",
-                subject=config,
-                action="Wait until that has ended, or stop it",
-            ) from error
 
 
 def _note(descriptor: int, text: str) -> None:

@@ -121,7 +121,14 @@ def _whole_design(cell: Cell, commands: PoseBatch) -> Iterator[FileError]:
     if singular is not None:
         yield singular
     elif not stands.any():
-        yield _out_of_reach(cell, robot, commands)
+        pose = Pose(*commands[[0]].numbers()[0].tolist())
+        reason = next(broken_limits(robot, pose), "a passive joint or a leg is beyond its limits")
+        yield FileError(
+            f"all {len(commands)} stated poses are out of reach; the first, {pose}: {reason}",
+            subject=cell.path,
+            line=cell.document.line_of(("identification", "points")),
+            action=_way_into_reach(cell, robot, commands),
+        )
 
 
 def _points_in_metres(cell: Cell, controller: ControllerGeometry, commands: PoseBatch) -> FileError | None:
@@ -246,18 +253,6 @@ def _similarity(base: Array, platform: Array) -> float:
     one, other = (part - part.mean(axis=0) for part in (base, platform))
     one *= np.linalg.norm(other) / np.linalg.norm(one)
     return float(np.abs(one @ orthogonal_procrustes(one, other)[0] - other).max() / np.abs(other).max())
-
-
-def _out_of_reach(cell: Cell, robot: Robot, commands: PoseBatch) -> FileError:
-    """All stated poses are out of reach: the first reason, and what helps."""
-    pose = Pose(*commands[[0]].numbers()[0].tolist())
-    reason = next(broken_limits(robot, pose), "a passive joint or a leg is beyond its limits")
-    return FileError(
-        f"all {len(commands)} stated poses are out of reach; the first, {pose}: {reason}",
-        subject=cell.path,
-        line=cell.document.line_of(("identification", "points")),
-        action=_way_into_reach(cell, robot, commands),
-    )
 
 
 def _way_into_reach(cell: Cell, robot: Robot, commands: PoseBatch) -> str:

@@ -81,7 +81,13 @@ def chosen_records(
             campaign.carry_out()
             return ChosenRecords(campaign.plan.robot, campaign.measurements)
         case OrientationChoice.FIXED:
-            return ChosenRecords(robot, _visited(robot, truth, _best_fixed(settings, robot, truth), random))
+            virtual, records = VirtualRobot(robot, truth, random), list[Record]()
+            for point, poses in enumerate(_best_fixed(settings, robot, truth), start=1):
+                virtual.zero_gauges()
+                for orientation, pose in enumerate(poses, start=1):
+                    virtual.place(pose)
+                    records.append(virtual.measure(point, orientation))
+            return ChosenRecords(robot, MeasurementSet(tuple(records)))
         case OrientationChoice.SIFTED:
             sifted = _random(settings, robot, truth, random, RANDOM_DEG[:1], MOST_TRIES)
             return ChosenRecords(robot, sifted)
@@ -149,18 +155,6 @@ def possible_targets(belief: RobotBelief, zero: GaugeZero, count: int, seed: int
 
 def _zero(belief: RobotBelief, chosen: ReachableTargets) -> GaugeZero:
     return estimate_gauge_zero(belief, chosen.poses, chosen.joints, np.zeros((len(chosen), 3)))
-
-
-def _visited(
-    robot: Robot, truth: Geometry, sets: list[list[Pose]], random: np.random.Generator
-) -> MeasurementSet:
-    virtual, records = VirtualRobot(robot, truth, random), list[Record]()
-    for point, poses in enumerate(sets, start=1):
-        virtual.zero_gauges()
-        for orientation, pose in enumerate(poses, start=1):
-            virtual.place(pose)
-            records.append(virtual.measure(point, orientation))
-    return MeasurementSet(tuple(records))
 
 
 def _random(

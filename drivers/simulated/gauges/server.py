@@ -184,7 +184,14 @@ class GaugeLineServer(Closeable):
         ready, _, _ = select.select(watched, [], [], until_next_s)
         if self._wake_read in ready:
             os.read(self._wake_read, COMMAND_LIMIT)
-            self._do_jobs()
+            while not self._jobs.empty():
+                job, done = self._jobs.get()
+                try:
+                    job()
+                except Exception as error:
+                    done.set_exception(error)
+                else:
+                    done.set_result(None)
         else:
             received = self._line.receive(ready)
             if self._line.openings != self._openings:
@@ -201,16 +208,6 @@ class GaugeLineServer(Closeable):
 
     def _is_restarting(self) -> bool:
         return monotonic() < self._restarted_s
-
-    def _do_jobs(self) -> None:
-        while not self._jobs.empty():
-            job, done = self._jobs.get()
-            try:
-                job()
-            except Exception as error:
-                done.set_exception(error)
-            else:
-                done.set_result(None)
 
     def _answer(self, command: bytes) -> None:
         answer = self.instrument.answer(command)

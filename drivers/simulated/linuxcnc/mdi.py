@@ -73,17 +73,6 @@ def parse_block(block: str, current: Pose, modes: ModalState | None = None) -> P
         if letter not in (*_AXES, "F"):
             raise BlockError(f"Bad character '{letter.lower()}' used")
     feed = numbers.pop("F", None)
-    after = _modes_after(codes, feed, before)
-    if not numbers and 1.0 not in codes:
-        return ParsedBlock(after)
-    shifts = _NOWHERE if _MACHINE_COORDINATES in codes else after.offset
-    here = zip(_AXES, current.as_tuple(), shifts, strict=True)
-    target = Pose(*(numbers[axis] + shift if axis in numbers else value for axis, value, shift in here))
-    duration_s = _duration(after, feed, current, target)
-    return ParsedBlock(after, target, duration_s) if numbers else ParsedBlock(after)
-
-
-def _modes_after(codes: Sequence[float], feed: float | None, before: ModalState) -> ModalState:
     for code in codes:
         if code not in (*_MOTIONS, *_FEED_MODES, *_MODES, _MACHINE_COORDINATES):
             raise BlockError("G-code out of range" if code >= 100 else "Unknown g code used")
@@ -91,7 +80,14 @@ def _modes_after(codes: Sequence[float], feed: float | None, before: ModalState)
     feed_mode = _one_of_group(codes, _FEED_MODES, before.feed_mode)
     kept = before.feed if feed_mode == before.feed_mode == PER_MINUTE else 0.0
     stated = feed if feed is not None and feed_mode == PER_MINUTE else kept
-    return replace(before, motion=motion, feed_mode=feed_mode, feed=stated)
+    after = replace(before, motion=motion, feed_mode=feed_mode, feed=stated)
+    if not numbers and 1.0 not in codes:
+        return ParsedBlock(after)
+    shifts = _NOWHERE if _MACHINE_COORDINATES in codes else after.offset
+    here = zip(_AXES, current.as_tuple(), shifts, strict=True)
+    target = Pose(*(numbers[axis] + shift if axis in numbers else value for axis, value, shift in here))
+    duration_s = _duration(after, feed, current, target)
+    return ParsedBlock(after, target, duration_s) if numbers else ParsedBlock(after)
 
 
 def _one_of_group(codes: Sequence[float], group: tuple[float, ...], before: int) -> int:

@@ -42,7 +42,15 @@ def main(options: argparse.Namespace, console: Console) -> ExitCode:
         compared = compare_runs(cell, *options.compare)
         console.show(_comparison_document(*compared), comparison_text(*compared))
     elif options.show is not None:
-        _show(find_run(cell, options.show), console)
+        run = find_run(cell, options.show)
+        entries = read_entries(run.journal)
+        if not entries:
+            raise UsageError("nothing happened in this run", subject=run.path, action="Name another")
+        told = [
+            {"line": entry.number, "at": entry.at, "kind": entry.event.kind, "text": text}
+            for entry, text in run_story(entries)
+        ]
+        console.show({"events": told}, story_text(entries))
     elif options.keep is not None:
         _keep(cell, options, console)
     elif options.changes:
@@ -103,17 +111,6 @@ def _changes(cell: Cell, console: Console) -> None:
         console.warn(f"{found.path}, line {line}: this record is torn, damaged or newer, and left out")
     writes = [_write_document(one) for one in found.writes]
     console.show({"changes": writes, "damaged_lines": found.damaged}, config_history_text(found))
-
-
-def _show(run: RunFolder, console: Console) -> None:
-    entries = read_entries(run.journal)
-    if not entries:
-        raise UsageError("nothing happened in this run", subject=run.path, action="Name another")
-    told = [
-        {"line": entry.number, "at": entry.at, "kind": entry.event.kind, "text": text}
-        for entry, text in run_story(entries)
-    ]
-    console.show({"events": told}, story_text(entries))
 
 
 def _comparison_document(before: RunFolder, after: RunFolder, compared: RunComparison) -> dict[str, Any]:

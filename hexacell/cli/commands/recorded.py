@@ -3,7 +3,6 @@
 import argparse
 import asyncio
 from dataclasses import asdict
-from pathlib import Path
 
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
@@ -63,7 +62,14 @@ def report(options: argparse.Namespace, console: Console) -> ExitCode:
     """Write the report; the run folder is only read, unless the report goes into it."""
     output = options.output or OutputFile(options.run / "report.html", REPORT)
     target = output.path
-    _require_possible(target, is_comparison=options.compare is not None)
+    if target.suffix not in KINDS:
+        action = "Name one that ends in .html, .pdf or .xml"
+        raise UsageError("reports of this kind are not made", subject=target, action=action)
+    if options.compare is not None and target.suffix == CERTIFICATE:
+        raise UsageError(
+            "a certificate compares nothing",
+            action="Leave --compare away, or name a file that ends in .pdf",
+        )
     output.require()
     earlier = None if options.compare is None else reported_run(options.compare)
     run = reported_run(options.run)
@@ -73,17 +79,6 @@ def report(options: argparse.Namespace, console: Console) -> ExitCode:
     title = certificate.TITLE if target.suffix == CERTIFICATE else made.title.lower()
     console.print(f"{target}: {title}, {made.verdict}")
     return ExitCode.DONE
-
-
-def _require_possible(target: Path, *, is_comparison: bool) -> None:
-    if target.suffix not in KINDS:
-        action = "Name one that ends in .html, .pdf or .xml"
-        raise UsageError("reports of this kind are not made", subject=target, action=action)
-    if is_comparison and target.suffix == CERTIFICATE:
-        raise UsageError(
-            "a certificate compares nothing",
-            action="Leave --compare away, or name a file that ends in .pdf",
-        )
 
 
 def _written(suffix: str, run: ReportedRun, made: Report) -> bytes:

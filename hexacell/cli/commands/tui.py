@@ -26,7 +26,11 @@ def main(options: argparse.Namespace, _: Console) -> ExitCode:
 
     Raises ``UsageError`` without a terminal, ``FileError`` if the key map cannot be read.
     """
-    _require_terminal()
+    action = "Use `hexacell run`, which asks line by line"
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        raise UsageError("the screen needs a terminal", action=action)
+    if os.environ.get("TERM") == "dumb":
+        raise UsageError("this terminal cannot draw a screen (TERM is dumb)", action=action)
     end_with_terminal(sys.stdin.fileno())
     path: Path = options.cell
     app = TechnicianApp(
@@ -40,15 +44,6 @@ def main(options: argparse.Namespace, _: Console) -> ExitCode:
     # Everything is closed; to take all modules apart would last half a second more.
     sys.stdout.flush()
     os._exit(int(ExitCode.DONE))
-
-
-def _require_terminal() -> None:
-    """Refuse what Textual would draw on all the same; raises ``UsageError``."""
-    action = "Use `hexacell run`, which asks line by line"
-    if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        raise UsageError("the screen needs a terminal", action=action)
-    if os.environ.get("TERM") == "dumb":
-        raise UsageError("this terminal cannot draw a screen (TERM is dumb)", action=action)
 
 
 def _model(path: Path) -> ScreenModel:

@@ -84,21 +84,17 @@ def _copy_cell(cell_file: Path, folder: Path) -> Path:
                 subject=folder,
                 action="Choose another with --folder",
             )
-        _clear(folder)
+        # The marker is kept so that a removal that fails can be repeated.
+        configs = list(folder.glob(f"*{CONTROLLER}"))
+        kept = {folder / MARKER, *(folder / lock_path(config).name for config in configs)}
+        with ExitStack() as locks:
+            for config in configs:
+                locks.enter_context(cell_lock(config))
+            with os_errors("the earlier demo cannot be removed", folder):
+                for item in set(folder.iterdir()) - kept:
+                    shutil.rmtree(item) if item.is_dir() and not item.is_symlink() else item.unlink()
     create_folder_durably(folder)
     write_own(folder / MARKER, b"made by hexacell demo, which replaces this folder\n")
     for source in cell_file.parent.glob(f"{cell_file.stem}*.toml"):
         write_own(folder / source.name, read_bytes(source))
     return folder / cell_file.name
-
-
-def _clear(folder: Path) -> None:
-    """Remove all but the marker, which is kept so that a removal that fails can be repeated."""
-    configs = list(folder.glob(f"*{CONTROLLER}"))
-    kept = {folder / MARKER, *(folder / lock_path(config).name for config in configs)}
-    with ExitStack() as locks:
-        for config in configs:
-            locks.enter_context(cell_lock(config))
-        with os_errors("the earlier demo cannot be removed", folder):
-            for item in set(folder.iterdir()) - kept:
-                shutil.rmtree(item) if item.is_dir() and not item.is_symlink() else item.unlink()

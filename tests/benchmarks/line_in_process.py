@@ -17,7 +17,7 @@ from random import Random
 import pytest
 import serial
 
-from drivers.serial import port
+from drivers.serial import port, request_port
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.bank import instrument_class
 from drivers.simulated.gauges.instruments import Indicator, Instrument
@@ -209,7 +209,8 @@ class GaugesOnLines:
             assert do_not_open
             return self.lines[url].opened_with(time, parity)
 
-        monkeypatch.setattr(port, "time", time)
+        for module in (port, request_port):
+            monkeypatch.setattr(module, "time", time)
         monkeypatch.setattr(serial, "serial_for_url", opened)
         self._ports = SharedSerialPorts(trace=WireTrace(TRACE_BYTES))
         self.mounted = tuple(

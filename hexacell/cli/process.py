@@ -16,7 +16,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from importlib.util import find_spec
 from types import FrameType
 
@@ -145,4 +145,5 @@ def log(file: OutputFile | None, verbosity: int) -> Iterator[None]:
             logger.setLevel(logging.NOTSET)
         handler.close()
         if stream is not None:
-            stream.close()
+            with suppress(OSError):  # it tries once more what a full disk has not taken
+                stream.close()

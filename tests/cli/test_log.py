@@ -36,6 +36,7 @@ def test_a_log_that_cannot_be_written_is_refused(typed_here, quick_cell, tmp_pat
     outcome = typed_here("status", quick_cell.cell, "--log-file", tmp_path)
     assert (outcome.code, outcome.out) == (2, "")
     assert "the log cannot be written: Is a directory" in outcome.err
+    assert typed_here("status", quick_cell.cell, "--log-file", "/dev/full").code == 0
     outcome = typed_here("tui", quick_cell.cell, "-v")
     assert (outcome.code, "Name a file: --log-file FILE" in outcome.err) == (2, True)
 

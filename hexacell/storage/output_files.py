@@ -102,7 +102,11 @@ class OutputFile:
             return os.open(self.path, flags | os.O_CREAT | os.O_EXCL, self.kind.mode)
         except FileExistsError:
             descriptor = os.open(self.path, flags)
-        if not appends and stat.S_ISREG(os.fstat(descriptor).st_mode):
+        status = os.fstat(descriptor)
+        if not appends and stat.S_ISREG(status.st_mode):
+            if status.st_nlink > 1:  # the other may be that of a journal, which events are a copy of
+                os.close(descriptor)
+                raise self._refusal("has another name too, whose content would be lost")
             os.ftruncate(descriptor, 0)
         return descriptor
 

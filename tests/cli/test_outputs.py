@@ -88,6 +88,9 @@ def test_what_an_option_wrote_before_it_writes_again(tmp_path) -> None:
             with os.fdopen(output.open_stream(appends=kind is LOG), "wb") as stream:
                 stream.write(text + b"\n")
         assert len(output.path.read_bytes().splitlines()) == lines
+    (tmp_path / "kept").hardlink_to(tmp_path / EVENTS.noun)
+    with pytest.raises(FileError, match="another name"):
+        OutputFile(tmp_path / EVENTS.noun, EVENTS).open_stream()
     linked = tmp_path / "linked.prom"
     linked.symlink_to(tmp_path / "cell.prom")
     (tmp_path / "cell.prom").touch()

@@ -55,8 +55,8 @@ def refused(error: UncorrectableFaultError) -> DataFault:
             found = error.left.equations
             consequence = f", and the records before it and at the other points give only {found} equations"
             return _zero_shift(shift, consequence)
-        case GaugeFaultHypothesis() as fault:
-            return _gauge_fault(fault, error.before, error.after)
+        case GaugeFaultHypothesis():
+            return _gauge_faults(error.before, error.after)
     raise TypeError(error.fault)
 
 
@@ -85,22 +85,34 @@ def _rejected_record(test: DeletionTest) -> DataFault:
     )
 
 
-def _gauge_fault(hypothesis: GaugeFaultHypothesis, before: CorrectedFit, after: CorrectedFit) -> DataFault:
-    """The residuals before and after the correction are the evidence."""
-    fault = hypothesis.gauge_fault
-    where = "at every point" if hypothesis.point is None else f"at point {hypothesis.point}"
-    is_plural, columns = len(fault.gauges) > 1, " and ".join(f"d{gauge}" for gauge in fault.gauges)
-    *looks, correction, action = GAUGE_FAULT_WORDS[fault.kind]
-    without = ""
+def _gauge_faults(before: CorrectedFit, after: CorrectedFit) -> DataFault:
+    """The residuals before and after the correction of all that was found are the evidence."""
+    found = [one for one in after.faults if isinstance(one, GaugeFaultHypothesis)]
+    looks, corrections, actions = zip(*map(_gauge_fault_words, found), strict=True)
+    without, rest = "", ""
     if before.lost:
         without = f" without {before.lost} record{'s' if before.lost > 1 else ''} that no geometry explains"
+    if others := len(after.faults) - len(found):
+        rest = f" and without records that {others} other fault{'s' if others > 1 else ''} spoilt"
+    if not after.is_consistent:
+        rest += "; what is left has another cause"
     ratio, corrected_ratio = before.fit.goodness.ratio, after.fit.goodness.ratio
     sentence = (
-        f"{_names(fault.gauges)} {looks[is_plural]} {where}: the residuals are {ratio:.3g} times the "
-        f"stated noise{without}, and {corrected_ratio:.3g} times {correction}"
+        f"{' and '.join(looks)}: the residuals are {ratio:.3g} times the stated noise{without}, and "
+        f"{corrected_ratio:.3g} times {' and '.join(corrections)}{rest}"
     )
-    action = action.format(columns=f"{columns} {where}")
-    return DataFault(fault.kind, sentence, action, gauges=fault.gauges)
+    gauges = "".join(one for one in GAUGES if any(one in fault.gauge_fault.gauges for fault in found))
+    return DataFault(found[0].gauge_fault.kind, sentence, ". ".join(actions), gauges=gauges)
+
+
+def _gauge_fault_words(hypothesis: GaugeFaultHypothesis) -> tuple[str, str, str]:
+    """How a gauge fault looks, what corrects it, and what to do."""
+    fault = hypothesis.gauge_fault
+    where = "at every point" if hypothesis.point is None else f"at point {hypothesis.point}"
+    columns = " and ".join(f"d{gauge}" for gauge in fault.gauges)
+    *looks, correction, action = GAUGE_FAULT_WORDS[fault.kind]
+    look = f"{_names(fault.gauges)} {looks[len(fault.gauges) > 1]} {where}"
+    return look, correction, action.format(columns=f"{columns} {where}")
 
 
 def _wrong_readings(kind: DataFaultKind, gauges: str, offset_mm: Deviation) -> str:

@@ -15,8 +15,9 @@ instead of log n. Starting with no fault at all (:func:`select_faults`):
    separate the worlds of ``tests/benchmarks/worlds``: the largest statistic of an imperfect machine is 4.1
    critical values, and that of a reading off by 0.5 mm in a good one at least 4.8.
 
-Gross errors, and all records after a shift of a gauge's zero, are left out. Gauge faults are refused, after
-other starts of the solver were tried (:func:`_other_minimum`).
+Gross errors, and all records after a shift of a gauge's zero, are left out. Gauge faults are refused, if
+with all that was corrected the residuals can be trusted, and no fit of the records as they are explains
+them (:func:`_other_minimum`).
 
 First-order tests around a wrong solution are unreliable. The drawing is a better expansion point: it is
 within millimetres of the truth, whatever the gauges read. What is tried by refits, in this order
@@ -37,7 +38,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import islice
+from itertools import chain, islice, repeat
 
 from hexacell.identification.data_faults.corrected_fit import CorrectedFit
 from hexacell.identification.data_faults.deletion_tests import DeletionTest
@@ -87,7 +88,7 @@ class UncorrectableFaultError(Exception):
 
     Attributes:
         before: the fit that does not explain it.
-        after: the fit corrected for it.
+        after: the fit corrected for it, and for what else was found.
         left: the records that are left without it.
     """
 
@@ -128,8 +129,8 @@ def select_faults(problem: Problem, fit: Identification | None = None) -> Select
         if len(selected.rejected) > 1 or not selected.is_consistent:
             # Readings in inches resemble a machine that needs no calibration, with some gross errors.
             in_mm = refitted(uncorrected, ALL_IN_INCHES)
-            if in_mm is not None and in_mm.is_consistent:
-                _require_correctable(uncorrected, in_mm)
+            if in_mm is not None and in_mm.is_consistent and (refused := _refused(uncorrected, in_mm)):
+                raise refused
         readmitted = _readmitted(selected)
         return _only_proven(selected if readmitted is None else _forward(readmitted))
     except UncorrectableFaultError:
@@ -140,7 +141,12 @@ def select_faults(problem: Problem, fit: Identification | None = None) -> Select
 
 
 def _forward(current: CorrectedFit) -> CorrectedFit:
-    """Correct for the most likely hypothesis until nothing is significant, or too many were rejected."""
+    """Correct for the most likely hypothesis until nothing is significant, or too many were rejected.
+
+    What cannot be corrected is no cause unless all that was found explains the records; else the fit is of
+    the records as they were.
+    """
+    start, refused = current, None
     while len(current.rejected) < LARGEST_REJECTED_SHARE * current.original.records:
         extended = None if current.is_reliable else _searched(current)
         if extended is None:
@@ -152,9 +158,11 @@ def _forward(current: CorrectedFit) -> CorrectedFit:
             extended = next(filter(None, confirmed), None)
         if extended is None:
             break
-        _require_correctable(current, extended)
         current = extended
-    return current
+        refused = _refused(start, current)
+        if refused is not None and current.is_reliable:
+            raise refused
+    return current if refused is None else start.fitted(start.original, start.problem, start.faults, COARSE)
 
 
 def confirmed_by_refit(current: CorrectedFit, hypothesis: FaultHypothesis) -> CorrectedFit | None:
@@ -193,14 +201,15 @@ def refitted(current: CorrectedFit, hypothesis: FaultHypothesis) -> CorrectedFit
     return current.corrected_for(hypothesis)
 
 
-def _require_correctable(current: CorrectedFit, extended: CorrectedFit) -> None:
-    """Raise where the additional faults cannot be corrected by leaving records out."""
+def _refused(current: CorrectedFit, extended: CorrectedFit) -> UncorrectableFaultError | None:
+    """The first additional fault that cannot be corrected by leaving records out, if there is one."""
     left = current.problem
     for fault in extended.faults[len(current.faults) :]:
         left = fault.corrected(left)
         is_refused_shift = isinstance(fault, ZeroShiftHypothesis) and not left.is_determined
         if is_refused_shift or isinstance(fault, GaugeFaultHypothesis):
-            raise UncorrectableFaultError(fault, current, extended, left)
+            return UncorrectableFaultError(fault, current, extended, left)
+    return None
 
 
 def _searched(current: CorrectedFit) -> CorrectedFit | None:
@@ -319,12 +328,11 @@ def required_significance(rest: ChiSquareTest, faults: int) -> float:
 
 
 def _other_minimum(problem: Problem) -> CorrectedFit | None:
-    """A fit within the tolerances that explains all readings as they are, from another start."""
-    if problem.records > FEW_RECORDS:
-        return None
+    """A fit within the tolerances of all readings as they are, by a longer search or from other starts."""
     largest = LARGEST_MEAN_SQUARE * len(problem.prior.free)
-    for restarted in islice(restarts(problem), OTHER_STARTS):
-        found = CorrectedFit.uncorrected(restarted)
+    others = islice(restarts(problem), OTHER_STARTS if problem.records <= FEW_RECORDS else 0)
+    for start in chain([(problem, COARSE)], zip(others, repeat(QUICK))):
+        found = CorrectedFit.uncorrected(*start)
         if found.is_consistent and problem.prior.squared_distance(found.fit.free) <= largest:
             return found
     return None

@@ -5,17 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hexacell.identification.data_faults import messages
 from hexacell.identification.data_faults import stepwise_selection as proof
 from hexacell.identification.data_faults.corrected_fit import LARGEST_TRUSTED_RATIO, CorrectedFit
-from hexacell.identification.data_faults.hypotheses import ALL_IN_INCHES
+from hexacell.identification.data_faults.hypotheses import ALL_IN_INCHES, GAUGE_FAULTS
 from hexacell.identification.data_faults.stepwise_selection import (
+    UncorrectableFaultError,
     confirmed_by_refit,
     refitted,
     required_significance,
+    select_faults,
 )
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
-from hexacell.identification.solver.fit import fit_regularized
+from hexacell.identification.solver.fit import QUICK, fit_regularized
 from hexacell.identification.solver.result import DataFaultKind, GaugeFaultError
 from hexacell.uncertainty.possible_causes import possible_causes
 from tests.hexacell.altered_records import altered
@@ -155,6 +158,51 @@ def test_a_correction_that_loses_most_records_is_not_better(noisy, make_problem)
     assert few.lost == problem.records - rows.sum()
     assert few.misfit_beside(current) > 0.5 * current.misfit
     assert not few.is_better_by_far_than(current)
+
+
+@pytest.fixture
+def search_finds(monkeypatch):
+    """Has the search find faults one after another: inches first, then another, each with its fit."""
+    also_reversed = replace(ALL_IN_INCHES, gauge_fault=GAUGE_FAULTS[5])
+
+    def found(*fits):
+        def searched(current):
+            number = len(current.faults)
+            faults = (ALL_IN_INCHES, also_reversed)[: number + 1]
+            return replace(fits[number], faults=faults) if number < len(fits) else None
+
+        monkeypatch.setattr(proof, "_searched", searched)
+        monkeypatch.setattr(proof, "restarts", lambda _: iter(()))
+
+    return found
+
+
+def test_a_gauge_fault_that_leaves_far_more_than_the_noise_is_no_cause(noisy, make_problem, search_finds):
+    problem = make_problem(with_encoders(noisy, waves(5, 1.0)))
+    search_finds(CorrectedFit.uncorrected(problem))
+    found = select_faults(ALL_IN_INCHES.corrected(problem)).selected
+    assert found.faults == ()
+    assert found.fit.goodness.agreement is ChiSquareVerdict.TOO_LARGE
+
+
+def test_a_gauge_fault_is_named_with_what_else_explains_the_records(noisy, make_problem, search_finds):
+    right, nearly = make_problem(noisy), make_problem(with_encoders(noisy, waves(5, 1.0)))
+    search_finds(CorrectedFit.uncorrected(nearly), CorrectedFit.uncorrected(right))
+    with pytest.raises(UncorrectableFaultError) as raised:
+        select_faults(ALL_IN_INCHES.corrected(nearly))
+    sentence = messages.refused(raised.value).sentence
+    assert "inches at every point and gauge x looks reversed at every point: " in sentence
+    assert raised.value.after.is_consistent
+
+
+def test_no_gauge_is_blamed_if_a_longer_search_explains_the_records(noisy, make_problem, search_finds):
+    """The quick fit of a healthy robot far from its drawing may be cut short."""
+    problem = make_problem(noisy)
+    search_finds(CorrectedFit.uncorrected(problem))
+    cut_short = fit_regularized(ALL_IN_INCHES.corrected(problem), QUICK)
+    assert cut_short.goodness.ratio > LARGEST_TRUSTED_RATIO
+    found = select_faults(problem, cut_short).selected
+    assert (found.faults, found.is_consistent) == ((), True)
 
 
 def test_a_gauge_fault_needs_equations_that_could_contradict_it(visit, make_problem):

@@ -115,17 +115,6 @@ class VirtualCampaign:
     def _return_to(self, reference: Pose) -> None:
         """Go back to the reference of the present point."""
 
-    def _leave_point(self) -> None:
-        """Let the controller command with the estimate, if that is wanted and safe."""
-        plan = self.plan
-        if not plan.settings.identification.provisional or plan.robot.uses_provisional:
-            return
-        if plan.allows_provisional(self.state):
-            geometry = plan.estimate(self.state).belief.estimate
-            robot = plan.robot.with_provisional(geometry)
-            self.virtual_robot.load(robot)
-            self.plan = replace(plan, robot=robot)
-
     def _measure(self, decision: StartPoint | MeasurePose) -> None:
         record = self._take(decision)
         if record is not None:
@@ -151,7 +140,12 @@ class VirtualCampaign:
         done = self.state.done | {point}
         measured, pilots = self.state.measurements, self.state.pilots
         self.state = CampaignState(measured, done=done, present=reference, pilots=pilots)
-        self._leave_point()
+        plan = self.plan
+        is_wanted = plan.settings.identification.provisional and not plan.robot.uses_provisional
+        if is_wanted and plan.allows_provisional(self.state):
+            robot = plan.robot.with_provisional(plan.estimate(self.state).belief.estimate)
+            self.virtual_robot.load(robot)
+            self.plan = replace(plan, robot=robot)
 
 
 @dataclass(frozen=True, slots=True)

@@ -48,7 +48,17 @@ def listening_socket(path: Path) -> Iterator[socket.socket]:
         CellBusy: another process listens there.
         FileError: it cannot be made.
     """
-    _require_private(path.parent)
+    with os_errors("the folder for the socket cannot be made", path.parent):
+        with suppress(FileExistsError):
+            path.parent.mkdir(mode=0o700)
+        found = path.parent.lstat()
+    is_ours = stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid()
+    if not is_ours or stat.S_IMODE(found.st_mode) & 0o077:
+        raise FileError(
+            "this folder for sockets is not yours alone",
+            subject=path.parent,
+            action="Remove it, or set XDG_RUNTIME_DIR to a folder of yours with mode 700",
+        )
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         with _alone_in(path.parent):
@@ -93,21 +103,6 @@ def _runtime_folder() -> Path:
     if stated and Path(stated).is_dir():
         return Path(stated) / "hexacell"
     return Path(tempfile.gettempdir()) / f"hexacell-{os.getuid()}"
-
-
-def _require_private(folder: Path) -> None:
-    """Make the folder; refuse one that others could have made or can look into."""
-    with os_errors("the folder for the socket cannot be made", folder):
-        with suppress(FileExistsError):
-            folder.mkdir(mode=0o700)
-        found = folder.lstat()
-    is_ours = stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid()
-    if not is_ours or stat.S_IMODE(found.st_mode) & 0o077:
-        raise FileError(
-            "this folder for sockets is not yours alone",
-            subject=folder,
-            action="Remove it, or set XDG_RUNTIME_DIR to a folder of yours with mode 700",
-        )
 
 
 @contextmanager

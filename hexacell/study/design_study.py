@@ -99,22 +99,18 @@ def run_design_trial(trial: DesignTrial) -> DesignOutcome:
     random = np.random.default_rng([SEED, trial.number, 1])
     try:
         chosen = chosen_records(trial.choice, cell.settings, robot, truth, random)
-        return _outcome(cell, chosen, truth)
+        points = chosen.measurements.points
+        counts = [int(np.count_nonzero(points <= point)) for point in range(2, int(points.max()) + 1)]
+        if not counts:
+            return DesignOutcome(reason="the robot could be measured at no second point")
+        found = [_identified(chosen, count) for count in counts]
+        accuracies = tuple(_accuracy(cell, chosen.robot, one, truth) for one in found if one is not None)
+        deviations = [np.abs(record.deviation).max() for record in chosen.measurements.records]
+        last = found[-1]
+        reason = "" if last is not None else f"its {len(points)} records do not determine the robot"
+        return DesignOutcome(accuracies, float(max(deviations)), reason)
     except HexacellError as error:
         return DesignOutcome(reason=error.problem)
-
-
-def _outcome(cell: Cell, chosen: ChosenRecords, truth: Geometry) -> DesignOutcome:
-    points = chosen.measurements.points
-    counts = [int(np.count_nonzero(points <= point)) for point in range(2, int(points.max()) + 1)]
-    if not counts:
-        return DesignOutcome(reason="the robot could be measured at no second point")
-    found = [_identified(chosen, count) for count in counts]
-    accuracies = tuple(_accuracy(cell, chosen.robot, one, truth) for one in found if one is not None)
-    deviations = [np.abs(record.deviation).max() for record in chosen.measurements.records]
-    last = found[-1]
-    reason = "" if last is not None else f"its {len(points)} records do not determine the robot"
-    return DesignOutcome(accuracies, float(max(deviations)), reason)
 
 
 def _identified(chosen: ChosenRecords, count: int) -> Identification | None:

@@ -141,11 +141,7 @@ async def _look(
         return [f"{one.subject}: {one.problem}" for one in flatten_errors(error)]
     while len(window) > timing.readings and window[-1].at_s - window[1].at_s >= timing.window_s:
         window.popleft()
-    return _moving(devices, timing, Settled(tuple(window)))
-
-
-def _moving(devices: Devices, timing: TimingSettings, settled: Settled) -> list[str]:
-    """Names of what moved within the window, with how much."""
+    settled = Settled(tuple(window))
     gauges = zip(devices.gauges, np.ptp(settled.gauges, axis=0), strict=True)
     moving = [
         f"gauge {m.gauge.name} by {spread:.3f} mm"

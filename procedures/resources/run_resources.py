@@ -25,13 +25,13 @@ from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.calibration import Calibration
 from procedures.calibration.repeatability import since_zero
 from procedures.devices.device_set import Devices, Thermometers, gather_errors
-from procedures.devices.settling import DeviceSnapshot, Settled, read_series, settle, trimmed_mean
+from procedures.devices.settling import DeviceSnapshot, read_series, settle, trimmed_mean
 from procedures.guards.guards import Guards
 from procedures.guards.position_check import PositionReports
 from procedures.resources.controller_config import ConfigChanges, ConfigEdits, Startup
 from procedures.run.keys import SetKey, SixNumbers
 from procedures.run.questions import Operator
-from procedures.run.readings import Reading, ReadingSeries, Temperature, on_parts
+from procedures.run.readings import Reading, ReadingSeries, on_parts
 from procedures.run.state import RunState
 from procedures.run.trips import Guard, Trip, WatchedSet
 
@@ -167,15 +167,25 @@ class RunResources:
     # What the instruments read.
 
     async def read(self, state: RunState, windows: int = 1) -> Reading:
-        """The mean of some settled windows of all devices; raises ``HexacellError``."""
+        """Trimmed mean of settled windows, and the largest range within one; raises ``HexacellError``."""
         timing = self.settings.timing
         settled = [
             await self.guards.during_readings(lambda: settle(self.devices, timing, self.clock))
             for _ in range(windows)
         ]
-        reading = _reading(self.devices, settled, await self.thermometers.read(), state.directions)
-        on_them = on_parts(self.settings.thermometers, reading.temperatures)
-        return reading.model_copy(update={"part_temperatures": on_them})
+        gauges = trimmed_mean(np.concatenate([one.gauges for one in settled]))
+        joints = trimmed_mean(np.concatenate([one.joints for one in settled]))
+        spreads = np.max([np.ptp(one.gauges, axis=0) for one in settled], axis=0)
+        temperatures = await self.thermometers.read()
+        return Reading(
+            gauges_mm=deviation_of(_on_axes(self.devices, gauges)),
+            spread_mm=deviation_of(np.abs(_on_axes(self.devices, spreads))),
+            joints=joints_of(joints),
+            temperatures=temperatures,
+            part_temperatures=on_parts(self.settings.thermometers, temperatures),
+            directions=state.directions,
+            **_raw([snapshot for one in settled for snapshot in one.window]),
+        )
 
     async def read_series(self, count: int) -> ReadingSeries:
         """A series of readings of all devices, once they are settled; raises ``HexacellError``."""
@@ -197,26 +207,6 @@ class RunResources:
         """Make sure that the gauges are set as they were; raises ``HexacellError``."""
         checks = [mounted.gauge.check() for mounted in self.devices.gauges]
         await gather_errors("gauges are not as they were", checks)
-
-
-def _reading(
-    devices: Devices,
-    settled: Sequence[Settled],
-    temperatures: tuple[Temperature, ...],
-    directions: Directions,
-) -> Reading:
-    """The trimmed mean of settled windows, with the largest range within one of them."""
-    gauges = trimmed_mean(np.concatenate([one.gauges for one in settled]))
-    joints = trimmed_mean(np.concatenate([one.joints for one in settled]))
-    spreads = np.max([np.ptp(one.gauges, axis=0) for one in settled], axis=0)
-    return Reading(
-        gauges_mm=deviation_of(_on_axes(devices, gauges)),
-        spread_mm=deviation_of(np.abs(_on_axes(devices, spreads))),
-        joints=joints_of(joints),
-        temperatures=temperatures,
-        directions=directions,
-        **_raw([snapshot for one in settled for snapshot in one.window]),
-    )
 
 
 def _on_axes(devices: Devices, values: Array) -> Array:

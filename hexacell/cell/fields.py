@@ -20,6 +20,7 @@ from pydantic_core import PydanticCustomError
 
 from hexacell.addresses import require_host, require_serial_port
 from hexacell.errors import UsageError
+from hexacell.printable import printable
 from hexacell.storage.toml_document import MASK
 
 LARGEST_NUMBER = 1e6
@@ -134,6 +135,14 @@ NotNegative = Annotated[
     AfterValidator(_not_negative),
 ]
 Text = Annotated[str, Field(max_length=LONGEST_TEXT), AfterValidator(_printable)]
+Shown = Annotated[
+    str,
+    BeforeValidator(
+        lambda given: printable(given).replace("\n", r"\n") if isinstance(given, str) else given
+    ),
+]
+"""What nobody chose to be text, such as the name of a file: accepted, and made printable."""
+
 Host = Annotated[Text, AfterValidator(partial(accepted, require=require_host))]
 SerialPortName = Annotated[Text, AfterValidator(partial(accepted, require=require_serial_port))]
 Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME), AfterValidator(_a_name)]

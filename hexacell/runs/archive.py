@@ -148,6 +148,8 @@ class Archive:
         """Do something in one transaction; in a new file where the old one is damaged."""
         try:
             return self._act(act)
+        except UnicodeEncodeError as error:  # the name of a run, or of their folder, is no text
+            raise self._unavailable(error) from error
         except SQLAlchemyError as error:
             if self._file is None or not _is_damaged(error):
                 raise self._unavailable(error) from error
@@ -175,7 +177,7 @@ class Archive:
                 self._is_ready = True
             return act(connection)
 
-    def _unavailable(self, error: SQLAlchemyError) -> ArchiveUnavailable:
+    def _unavailable(self, error: Exception) -> ArchiveUnavailable:
         where = self._url.render_as_string() if self._file is None else self._file
         return ArchiveUnavailable(
             f"the archive cannot be used ({_reason(error)})",
@@ -200,7 +202,7 @@ def open_engine(url: URL, otherwise: str = "") -> Engine:
         raise ArchiveUnavailable(str(error), subject="PostgreSQL", action=action) from error
 
 
-def _reason(error: SQLAlchemyError) -> str:
+def _reason(error: Exception) -> str:
     """What the database said, in one line."""
     return " ".join(str(getattr(error, "orig", None) or error).split())
 

@@ -9,7 +9,6 @@ import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
-from unicodedata import category
 
 import pytest
 from hypothesis import given
@@ -20,6 +19,7 @@ from hexacell.cli.commands.status import _escaped
 from hexacell.cli.console import Console
 from hexacell.cli.process import fault_line, log
 from hexacell.printable import printable
+from hexacell.runs.run_folder import runs_folder
 from hexacell.screen.widgets import RowList, TextPanel
 from hexacell.storage.output_files import LOG, OutputFile
 from hexacell.text.report.pages import html_of
@@ -27,15 +27,11 @@ from procedures.journal.journal import encode, read_entries
 from procedures.steps import events
 from tests.hexacell.services.notify.notices import a_notice
 from tests.hexacell.text.test_report_pages import report
+from tests.mutations.texts import raw_signs
 
 CHECKOUT = Path(__file__).parents[2]
 HOSTILE = "a\x1b]0;title\x07\x1b[2J\x9b31m\x00\x08\x7f\r\u202e\u2066\u200b\u2028[red]\U000e0001z"
 TEXTS = st.text(st.characters(), max_size=30) | st.just(HOSTILE)
-
-
-def raw_signs(text: str) -> list[str]:
-    """The signs that a terminal or a reader may take for something else than they are."""
-    return [sign for sign in text if category(sign) in {"Cc", "Cf", "Cs", "Zl", "Zp"} and sign != "\n"]
 
 
 @given(TEXTS)
@@ -113,10 +109,20 @@ def test_commands_show_no_sign_of_hostile_files_and_arguments(typed_here, cell_f
         ["run", cell_folder.cell, "--resume", name],
         ["run", cell_folder.cell, name],
         ["report", odd],
+        ["devices", f"socket://{name}"],
     ):
         outcome = typed_here(*typed)
         assert outcome.code == 2, typed
         assert raw_signs(outcome.out + outcome.err) == []
+
+
+def test_runs_in_folders_whose_names_are_no_text_are_listed(typed_here, cell, run) -> None:
+    runs_folder(cell).mkdir(parents=True)
+    run.rename(runs_folder(cell) / "a\u2028\udcffz")
+    for command in ("history", "status"):
+        listed = typed_here(command, cell.path)
+        assert listed.code == 0, listed.err
+        assert raw_signs(listed.out + listed.err) == []
 
 
 def test_a_hostile_journal_is_shown_printable(typed_here, demo, tmp_path) -> None:

@@ -12,12 +12,17 @@ import tempfile
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from fnmatch import fnmatch
 from pathlib import Path
 
 from hexacell.cli.app import main
+from tests.mutations.texts import raw_signs
 
 CODES = frozenset({0, 1, 2, 3, 4, 5, 6, 130})
 """The documented exit codes, without that of a fault of the program."""
+
+OURS = ("cell/*/index.sqlite*", "cell/*report.*", "cell/units/*")
+"""What any command may make again, as patterns."""
 
 
 @dataclass(frozen=True)
@@ -36,11 +41,6 @@ class Place:
     def temporary(self) -> Path:
         """Where temporary files are made, of which none may stay."""
         return self.root / "temporary"
-
-    @property
-    def own(self) -> tuple[Path, Path]:
-        """What a command may change."""
-        return self.cell, self.temporary
 
     def refill(self, template: Path, made_in: Path) -> None:
         """Make the cell's folder a copy of another one, whose runs were made in a folder."""
@@ -68,14 +68,28 @@ class Attempt:
         return f"{' '.join(self.arguments)}: {'; '.join(self.problems)}\n{self.err[-2000:]}"
 
 
-def contents(folder: Path, but: Sequence[Path]) -> dict[Path, bytes | None]:
-    """Everything below a folder, but not what is below some of its parts."""
+def contents(folder: Path) -> dict[Path, bytes | None]:
+    """Everything below a folder: files, where links lead to, and None for what is neither."""
     found: dict[Path, bytes | None] = {}
     for path in folder.iterdir():
+        if path.is_symlink():
+            found[path] = os.fsencode(path.readlink())
+            continue
         found[path] = path.read_bytes() if path.is_file() else None
-        if path.is_dir() and path not in but:
-            found |= contents(path, but)
+        found |= contents(path) if path.is_dir() else {}
     return found
+
+
+def changes(before: dict[Path, bytes | None], place: Place, may_change: Sequence[str]) -> Iterator[str]:
+    """What is not as it was, but for what may change and for new files of the cell beside its runs."""
+    after = contents(place.root)
+    for path in sorted(before.keys() | after.keys()):
+        name = path.relative_to(place.root).as_posix()
+        is_new = path not in before and name.startswith("cell/")
+        is_new &= path.parent / "journal.jsonl" not in before
+        is_same = (path in before, before.get(path)) == (path in after, after.get(path))
+        if not (is_same or is_new or any(fnmatch(name, one) for one in (*OURS, *may_change))):
+            yield f"changed: {name}"
 
 
 @contextlib.contextmanager
@@ -87,19 +101,18 @@ def _temporary_files_in(folder: Path) -> Iterator[None]:
         tempfile.tempdir = before
 
 
-def attempt(arguments: Sequence[object], place: Place) -> Attempt:
-    """Run a command on the cell of a place."""
+def attempt(arguments: Sequence[object], place: Place, may_change: Sequence[str] = ()) -> Attempt:
+    """Run a command on the cell of a place, where it may change files of some patterns."""
     typed = tuple(map(str, arguments))
-    before = contents(place.root, place.own)
+    before = contents(place.root)
     began = _cpu_seconds()
     code, out, err, problems = (_in_a_process if place.as_process else _in_this_process)(typed, place)
     seconds = _cpu_seconds() - began
     problems += _wrong_end(code, out, err, is_json="--json" in typed)
-    if contents(place.root, place.own) != before:
-        problems.append("something outside was changed")
     for left in place.temporary.iterdir():
         problems.append(f"left behind: {left.name}: {left.read_text() if left.is_file() else 'a folder'}")
         left.unlink() if left.is_file() else shutil.rmtree(left)
+    problems += changes(before, place, may_change)
     return Attempt(typed, code, out, err, seconds, tuple(problems))
 
 
@@ -148,6 +161,8 @@ def _wrong_end(code: int, out: str, err: str, *, is_json: bool) -> Iterator[str]
         yield "a traceback"
     if code and not err.strip() and not out.strip():
         yield "nothing was said"
+    if signs := raw_signs(out + err):
+        yield f"raw: {signs}"
     if is_json:
         try:
             json.loads(out)

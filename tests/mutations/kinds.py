@@ -2,7 +2,7 @@
 
 import random
 
-from tests.mutations import trials
+from tests.mutations import hands, trials
 from tests.mutations.prompts import answers_to_prompts
 from tests.mutations.trials import Trial
 
@@ -22,8 +22,11 @@ SHARES: dict[Trial, int] = {
     trials.earlier_runs_listed: 30,
     trials.config_writes_listed: 20,
     trials.run_reported: 30,
+    hands.output_named: 60,
+    hands.run_with_a_link: 60,
+    hands.odd_argument: 60,
 }
-"""How many of a thousand trials are of which kind; those that compute much are rarer."""
+"""How many of some 1200 trials are of which kind; those that compute much are rarer."""
 
 
 def drawn_trial(draw: random.Random) -> Trial:

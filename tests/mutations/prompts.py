@@ -16,7 +16,7 @@ from tests.cli.cell_folder import ASK, BY_HAND, changed
 from tests.mutations.attempts import Attempt, Place, attempt
 from tests.mutations.journals import with_checksum
 from tests.mutations.texts import ANY, STRANGE_BYTES, STRANGE_NUMBERS, STRANGE_TEXTS, mutated
-from tests.mutations.trials import CELL, RUN, Templates
+from tests.mutations.trials import CELL, OF_A_RUN, RUN, Templates
 
 OFFERED = ("", "y", "yes", "no", "n", "a", "r", "u", "m", "retry", "abort", "simulated-hexaglide")
 END_OF_INPUT = b"\x04"
@@ -75,4 +75,4 @@ def answers_to_prompts(templates: Templates, place: Place, draw: random.Random) 
     ask_before_writing(place.cell)
     lines = [answer(draw) for _ in range(draw.randint(1, MOST_ANSWERS))]
     with typed_at_a_terminal(lines):
-        return attempt(["run", place.cell / CELL, "--mode", "optimise", "--resume", "run"], place)
+        return attempt(["run", place.cell / CELL, "--mode", "optimise", "--resume", "run"], place, OF_A_RUN)

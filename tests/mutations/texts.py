@@ -1,8 +1,25 @@
 """Mutations of bytes and of TOML and CSV texts, as a careless or hostile hand makes them."""
 
+import json
 import random
 import re
 from collections.abc import Callable, Sequence
+from unicodedata import category
+
+SIGNS = (
+    "\x1b[2J", "\x1b]0;t\x07", "\x1bP1$r\x1b\\", "\x9b31m", "\a\b", "\r", "\u202e", "\u2066", "\u200b",
+    "\u2028",
+)  # fmt: skip
+"""What acts on a terminal, or hides how a line reads."""
+
+ADDRESSES = (
+    "http://[::1/", "http://[::1]:99999/", "https://user:pass@127.0.0.1:9/a?b=c#d", "http://127.0.0.1:-1/",
+    "http://[::ffff:169.254.169.254]/", "mqtts://[fe80::1%lo]:9", "spy:///dev/ttyS0?file=canary", "loop://",
+    "socket://127.0.0.1:70000", "rfc2217://u@[::1]:9?logging=debug", "hwgrep://.*", "postgresql://[",
+    "interface=virtual,channel=\x1b[2J", "interface=slcan,channel=/dev/full,bitrate=0", "127.0.0.1:9",
+    "127.0.0.1:99999999999", "mailto://127.0.0.1:9?from=a@b&to=c@d&smtp=169.254.169.254", "file:///etc/hosts",
+    *(f"http://127.0.0.1:9/{sign}" for sign in SIGNS), *(f"socket://{sign}:9" for sign in SIGNS),
+)  # fmt: skip
 
 STRANGE_NUMBERS = (
     "1e308", "-1e308", "1e-320", "5e-324", "nan", "inf", "-inf", "-0.0", "-0", "0", "0.0", "-1", "1", "2",
@@ -12,9 +29,9 @@ STRANGE_NUMBERS = (
 )  # fmt: skip
 STRANGE_TEXTS = (
     "", " ", "\\u0000", "../../outside", "/etc/passwd", "../outside/canary", "x" * 300, "é", "日本",
-    "\u202e",
     "%s%n", "{0}", "${HOME}", "$(id)", "a\\nb", "\\t", "true", "1", "nan", ".", "..", "/dev/zero",
     "/dev/stdin", "CON", "-rf", "--help", "\\ud800", "\U0001f916", "x" * 5000,
+    *SIGNS, *(sign.encode("unicode_escape").decode().replace("\\x", "\\u00") for sign in SIGNS),
 )  # fmt: skip
 STRANGE_TOKENS = (
     "true", "false", "[]", "{}", "[[]]", "[1, 2]", "{ a = 1 }", '""', "1979-05-27", "07:32:00",
@@ -25,8 +42,7 @@ STRANGE_BYTES = (
     b"\xff",
     b"\xfe\xff",
     b"\xed\xa0\x80",
-    b"\x1b[2J",
-    b"\r",
+    *map(str.encode, SIGNS),
     b"\x0c",
     b"\x85",
     b"\xef\xbb\xbf",
@@ -34,7 +50,15 @@ STRANGE_BYTES = (
 
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\d_]*(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w.])")
 _VALUE = re.compile(r"(?m)(?<==)[ \t]*(\"[^\"\n]*\"|\[[^\n]*\]|[^\s#\[\"]+)")
+_KEY = re.compile(r"(?m)^[\w.]+(?= =)")
+_ADDRESS = re.compile(r'(?<=url = |ort = |ost = )"[^"\n]*"')
 _TOKEN = re.compile(r"[A-Za-z_]\w*|[-+]?\d[\d.eE+-]*|[\[\]{}=,\"'#.]")
+
+
+def raw_signs(text: str) -> list[str]:
+    """The signs that a terminal or a reader may take for something else than they are."""
+    return [sign for sign in text if category(sign) in {"Cc", "Cf", "Cs", "Zl", "Zp"} and sign != "\n"]
+
 
 Mutation = Callable[[bytes, random.Random], bytes]
 
@@ -136,6 +160,16 @@ def other_token(data: bytes, draw: random.Random) -> bytes:
     return f"{text[: one.start()]}{token}{text[one.end() :]}".encode()
 
 
+def other_address(data: bytes, draw: random.Random) -> bytes:
+    """An address in quotes replaced by a strange one."""
+    return _one_replaced(_ADDRESS, data, draw, [json.dumps(one) for one in ADDRESSES])
+
+
+def other_key(data: bytes, draw: random.Random) -> bytes:
+    """A key in quotes, with signs that no key has."""
+    return _one_replaced(_KEY, data, draw, [f'"{one}"' for one in STRANGE_TEXTS])
+
+
 def _one_replaced(
     pattern: re.Pattern[str], data: bytes, draw: random.Random, tokens: Sequence[str]
 ) -> bytes:
@@ -164,14 +198,14 @@ def other_cell(data: bytes, draw: random.Random) -> bytes:
             for each in rows[1:]:
                 each[min(place, len(each) - 1)] = draw.choice(STRANGE_NUMBERS)
         case _:
-            row[place] = draw.choice((*STRANGE_NUMBERS, "", "a", '"', "1;2", "1,5", "٣"))
+            row[place] = draw.choice((*STRANGE_NUMBERS, "", "a", '"', "1;2", "1,5", "٣", *SIGNS))
     return "\n".join(",".join(each) for each in rows).encode()
 
 
 ANY: tuple[Mutation, ...] = (flipped, inserted, cut, other_encoding, other_lines)
 TOML: tuple[Mutation, ...] = (
     *ANY, other_number, other_number, other_number, scaled_number, scaled_number, other_text, other_type,
-    other_type, other_token,
+    other_type, other_token, other_key, other_address,
 )  # fmt: skip
 CSV: tuple[Mutation, ...] = (*ANY, other_number, scaled_number, other_cell, other_cell, other_lines)
 

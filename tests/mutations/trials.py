@@ -14,6 +14,8 @@ from tests.mutations.texts import ANY, CSV, TOML, mutated
 CELL, CONFIG, RECORDS = "cell.toml", "simulated-hexaglide.controller.toml", "m.csv"
 _ODD = re.compile(r"\w+ = [-+.\de]+\n")
 RUN = Path("runs") / "simulated-hexaglide" / "run"
+OF_A_RUN = ("cell/runs/*", f"cell/{CONFIG}")
+"""What runs, and what undoes them, may change."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +118,12 @@ def run_resumed(templates: Templates, place: Place, draw: random.Random) -> Atte
     path.write_bytes(mutated_file(path, draw))
     named = draw.choice(([], ["run"]))
     command = ["run", place.cell / CELL, "--unattended", "--mode", "optimise", "--resume", *named]
-    return attempt(command, place)
+    return attempt(command, place, OF_A_RUN)
+
+
+def move_out_of_reach(cell: Path) -> None:
+    """Let every run of a cell end before it begins."""
+    cell.write_text(cell.read_text().replace("[100.0, -100.0, 500.0]", "[100.0, -100.0, 5500.0]"))
 
 
 def run_checked(templates: Templates, place: Place, draw: random.Random) -> Attempt:
@@ -124,8 +131,7 @@ def run_checked(templates: Templates, place: Place, draw: random.Random) -> Atte
     name = draw.choice(("journal.jsonl", "write-back.json"))
     spoiled(templates.small, templates, place, RUN / name, draw)
     cell = place.cell / CELL
-    text = cell.read_text()
-    cell.write_text(text.replace("[100.0, -100.0, 500.0]", "[100.0, -100.0, 5500.0]"))
+    move_out_of_reach(cell)
     return attempt(["run", cell, "--unattended", "--mode", "check"], place)
 
 
@@ -157,7 +163,12 @@ def cell_file_scheduled(templates: Templates, place: Place, draw: random.Random)
     path = spoiled(templates.furnished, templates, place, CELL, draw)
     units = ["--folder", place.cell / "units"]
     command = draw.choice(
-        (["notify", path], ["schedule", path, "--daily", _time(draw), *units], ["status", path])
+        (
+            ["notify", path],
+            ["notify", path, "--test"],
+            ["schedule", path, "--daily", _time(draw), *units],
+            ["status", path],
+        )
     )
     return attempt([*command, *draw.choice(([], ["--json"]))], place)
 
@@ -196,7 +207,7 @@ def config_writes_listed(templates: Templates, place: Place, draw: random.Random
     path.write_bytes(mutated(path.read_bytes(), TOML, draw))
     cell = place.cell / CELL
     command = draw.choice((["history", cell, "--changes"], ["rollback", cell]))
-    return attempt([*command, *draw.choice(([], ["--json"]))], place)
+    return attempt([*command, *draw.choice(([], ["--json"]))], place, OF_A_RUN)
 
 
 def run_reported(templates: Templates, place: Place, draw: random.Random) -> Attempt:

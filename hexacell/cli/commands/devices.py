@@ -7,7 +7,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from pydantic import TypeAdapter, ValidationError
+
 from drivers.discovery.encoders import set_node_id
+from hexacell.cell.fields import SerialPortName, first_mistake
 from hexacell.cli.commands.cell import cell_at
 from hexacell.cli.console import Console
 from hexacell.cli.terminal import is_interactive
@@ -54,6 +57,8 @@ def _search(options: argparse.Namespace, console: Console) -> ExitCode:
         require_creatable(options.write.path)
         if not is_interactive():
             raise AnswerNeeded("--write asks what no device reports", action="Start it at a terminal")
+    for port in options.ports:
+        _require_port(port)
     buses = [_bus(words) for words in options.can]
     address = _address(options.controller)
     found = asyncio.run(search_devices(options.ports, buses, address))
@@ -94,6 +99,14 @@ def _watch(options: argparse.Namespace, console: Console) -> ExitCode:
     for line in found_devices.diagnosis_lines(found):
         console.print(wrapped(line))
     return ExitCode.DONE if found.is_usable else ExitCode.HARDWARE
+
+
+def _require_port(name: str) -> None:
+    try:
+        TypeAdapter(SerialPortName).validate_python(name)
+    except ValidationError as refusal:
+        action = "Name a device path, socket://HOST:PORT or rfc2217://HOST:PORT"
+        raise UsageError(first_mistake(refusal, "the port"), action=action) from refusal
 
 
 def _bus(words: str) -> dict[str, Any]:

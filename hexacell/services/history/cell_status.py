@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, TypeVar
 
 from pydantic import ValidationError
 
-from hexacell.cell.fields import LONGEST_TEXT, Frozen, Name, Text
+from hexacell.cell.fields import Frozen, Name, Shown, Text
 from hexacell.cell.loader import Cell
-from hexacell.printable import printable
 from hexacell.runs.cell_lock import lock_holder
 from hexacell.runs.run_folder import DocumentKind, StampedDocument, runs_folder
 from hexacell.services.history.drift_history import DriftHistory, drift_history
@@ -41,10 +40,10 @@ class FleetCell(Frozen):
     """
 
     name: Name
-    host: Text
-    cell: Text
+    host: Shown
+    cell: Shown
     seen_at: datetime
-    latest_run: Text | None = None
+    latest_run: Shown | None = None
     latest_at: datetime | None = None
     mode: Text = ""
     verdict: Verdict | None = None
@@ -53,7 +52,7 @@ class FleetCell(Frozen):
     judged_at: datetime | None = None
     passed_at: datetime | None = None
     due_at: datetime | None = None
-    proposal: Text | None = None
+    proposal: Shown | None = None
     changes: int = 0
 
     @property
@@ -111,7 +110,7 @@ def cell_status(cell: Cell) -> CellStatus:
     figures = FleetCell(
         name=cell.settings.name,
         host=socket.gethostname(),
-        cell=printable(str(cell.path.absolute())).replace("\n", r"\n")[-LONGEST_TEXT:],
+        cell=str(cell.path.absolute()),
         seen_at=datetime.now(UTC),
         latest_run=latest and latest.name,
         latest_at=summary_of(latest).ended,

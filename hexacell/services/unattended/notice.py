@@ -5,23 +5,18 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from hashlib import sha256
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import AfterValidator
-
-from hexacell.cell.fields import Frozen, Name, Text
+from hexacell.cell.fields import Frozen, Name, Shown, Text
 from hexacell.cell.loader import Cell
 from hexacell.cell.operation import Occasion
 from hexacell.errors import AnswerNeeded, DeviceError, ExitCode, HexacellError
-from hexacell.printable import printable
 from hexacell.services.history.cell_status import next_calibration_due
 from hexacell.services.history.past_runs import past_runs
 from hexacell.services.run.calibration_run import RunRequest
 from hexacell.verdict.decision import Verdict
 from procedures.run.state import RunState
 from procedures.steps import events
-
-Shown = Annotated[str, AfterValidator(printable)]
 
 
 class Notice(Frozen):

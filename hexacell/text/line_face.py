@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from hexacell.campaign.decisions import Forecast
 from hexacell.lengths import unit_of
 from hexacell.text.layout import COLUMNS, duration, wrapped
-from hexacell.text.measured_noise import measured_noise_text, reversal_sentence
+from hexacell.text.measured_noise import measured_noise_text, reversal_sentence, worsening_sentence
 from hexacell.text.planning import quick_accuracy_sentences, run_forecast_line
 from hexacell.text.terms import run_terms_text
 from hexacell.text.verdict import check_text, length_text, verification_text
@@ -137,10 +137,11 @@ def _whole_text(event: events.Event, state: RunState) -> str | None:
             pilots = len(state.set(event.at).pilots)
             meanwhile = f"meanwhile {pilots} pilot poses were read, by which the next ones are chosen"
             return f"{noise}\n{meanwhile}" if pilots else noise
-        case events.Identified(quick=quick, reversal=reversal):
+        case events.Identified(quick=quick, reversal=reversal, worsening=worse):
             known = "" if quick is None else f"quick level: {quick_accuracy_sentences(quick)}"
             found = "" if reversal is None else reversal_sentence(reversal)
-            return "\n".join(filter(None, [known, found])) or None
+            worsened = "" if worse is None else worsening_sentence(worse)
+            return "\n".join(filter(None, [known, found, worsened])) or None
         case events.ResultValidated():
             if event.verification is not None:
                 found = f"  {run_terms_text(state)}".rstrip()

@@ -8,6 +8,7 @@ from hexacell.noise.approach_scatter import RepeatedApproaches, ScatterSource
 from hexacell.noise.measured_noise import AveragingForecast, InstrumentNoise, MeasuredNoise
 from hexacell.noise.noise_assessment import worthwhile_windows
 from hexacell.noise.reversal import Reversal
+from hexacell.noise.worsening import Worsening
 from hexacell.text.layout import duration, wrapped
 
 THOUSAND = 1e3
@@ -41,6 +42,19 @@ def reversal_sentence(found: Reversal) -> str:
     return (
         f"reversal of the joints {smallest} to {largest} +- {unit.length(max(found.sigma))}, of the ball "
         f"{ball.number(found.ball_mm)} +- {ball.length(found.ball_sigma_mm)}; bidirectional {repeatability}"
+    )
+
+
+def worsening_sentence(found: Worsening) -> str:
+    """That the machine got worse, with both numbers, and what to look for."""
+    unit = unit_of(found.first_mm, found.later_mm)
+    beside, look = "between encoders and ball", "a screw, a clamp, a guide or a joint that works loose"
+    if found.is_seen:
+        beside, look = "seen by the encoders", "a drive that warms up, friction, a servo loop or a brake"
+    return (
+        f"the machine got worse during the run: at the ends of the last {found.sets} points the ball came "
+        f"back to within {unit.length(found.later_mm)} (one sigma of an axis, {beside}), to within "
+        f"{unit.length(found.first_mm)} before. Look for {look}, and calibrate again then"
     )
 
 

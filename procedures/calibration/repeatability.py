@@ -22,6 +22,7 @@ from hexacell.noise.noise_assessment import NoiseReadings, assess_again
 from hexacell.noise.repeats import Repeats
 from hexacell.noise.reversal import Reversal, Revisit, reversal_of
 from hexacell.noise.standstill import display_step
+from hexacell.noise.worsening import Worsening, worsening_of
 from procedures.run.keys import Phase
 from procedures.run.readings import Reading
 from procedures.run.set_state import SetState
@@ -148,6 +149,16 @@ def _visits(plan: Plan, state: RunState, allowances: Allowances) -> NoiseReading
         return None
     windows = state.noise.noise.windows
     return noise_readings(visited, plan.settings.encoders, allowances, windows=windows)
+
+
+def worsening_by_repeats(
+    plan: Plan, state: RunState, found: Identification, walk_mm: float
+) -> Worsening | None:
+    """What got worse from the first visits of a reference to the ends of the last sets, if anything did."""
+    robot = replace(plan.robot, noise=replace(plan.robot.noise, walk_mm=walk_mm))
+    allowances = Allowances(plan.settings, robot, is_measured=True, found=found)
+    changes = [*repeated_readings(state, plan, allowances)]
+    return worsening_of(changes, sum(one.readings > 0 for one in changes), robot.noise)
 
 
 def reversal_by_repeats(plan: Plan, state: RunState, found: Identification) -> Reversal | None:

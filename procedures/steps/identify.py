@@ -7,13 +7,14 @@ from hexacell.errors import LimitError
 from hexacell.identification.estimator import identify
 from hexacell.measurements.csv_file import write_measurements
 from hexacell.noise.reversal import Reversal
+from hexacell.noise.worsening import Worsening
 from hexacell.results.result import ExpectedImprovement, IdentificationResult
 from hexacell.verdict.assessment import Assessment, assess
 from hexacell.verdict.findings import findings
 from hexacell.verdict.fit_document import fit_document
 from procedures.calibration.calibration import Knowledge
 from procedures.calibration.held_out_poses import PosesByPoint, poses_after, poses_before
-from procedures.calibration.repeatability import reversal_by_repeats
+from procedures.calibration.repeatability import reversal_by_repeats, worsening_by_repeats
 from procedures.resources.run_resources import RunResources
 from procedures.run.keys import SixNumbers
 from procedures.run.state import RunState
@@ -26,7 +27,8 @@ class Identified(BaseEvent):
     ``held_out`` are measured at each point before and after, ``held_out_after`` only after: the robot
     cannot take them safely before it is calibrated. ``improvement`` is None where the robot can reach none
     of the task poses. ``quick`` is how well the quick level knows the robot; None in other runs.
-    ``reversal`` is what repeated visits of the references showed; None of too few.
+    ``reversal`` is what repeated visits of the references showed; None of too few. ``worsening`` is how
+    much worse the machine came back later; None unless significant.
     """
 
     kind: Literal["identified"] = "identified"
@@ -36,6 +38,7 @@ class Identified(BaseEvent):
     improvement: ExpectedImprovement | None = None
     quick: QuickAccuracy | None = None
     reversal: Reversal | None = None
+    worsening: Worsening | None = None
 
     kept_as: ClassVar[str] = "identified"
 
@@ -66,6 +69,7 @@ class Identify(Computation):
             improvement=assessed.improvement,
             quick=known.quick.accuracy(measurements) if is_quick else None,
             reversal=reversal_by_repeats(known.plan, state, identified),
+            worsening=worsening_by_repeats(known.plan, state, identified, robot.noise.walk_mm),
         )
 
 

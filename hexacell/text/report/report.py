@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from drivers.interfaces import DeviceIdentity
 from hexacell.cell.fields import CertificateSettings
 from hexacell.services.history.reported_run import ReportedRun
-from hexacell.text.measured_noise import measured_noise_sentences, reversal_sentence
+from hexacell.text.measured_noise import measured_noise_sentences, reversal_sentence, worsening_sentence
 from hexacell.text.report import results, statement
 from hexacell.text.report.pages import Chapter, Facts, Paragraph, Report, Table, Tone
 from procedures.run.readings import temperatures_shown
@@ -65,9 +65,10 @@ def conditions_chapter(run: ReportedRun) -> Chapter:
         pairs.append(("Temperature", "not measured"))
     pairs += [("Sets measured again", str(state.invalidated))] if state.invalidated else []
     noise = () if state.noise is None else measured_noise_sentences(state.noise.noise)
-    if state.identified is not None and (reversal := state.identified.reversal) is not None:
-        sentence = reversal_sentence(reversal)
-        noise = (*noise, f"{sentence[:1].upper()}{sentence[1:]}.")
+    if (found := state.identified) is not None:
+        worse = "" if found.worsening is None else worsening_sentence(found.worsening)
+        reversal = "" if found.reversal is None else reversal_sentence(found.reversal)
+        noise += tuple(f"{one[:1].upper()}{one[1:]}." for one in (worse, reversal) if one)
     columns = ("Set of records", "records", "largest deviation, mm", "drift of the gauges, mm")
     # The sets whose reference was read again, with how far the gauges had drifted by then.
     rows = tuple(

@@ -5,6 +5,7 @@ where they would be shown as zero. Files and documents for other programs are in
 """
 
 from dataclasses import dataclass
+from math import ceil, floor, log10
 
 MM_PER_METRE = 1000.0
 
@@ -57,6 +58,12 @@ def unit_of(*sizes: float | None, unit: str = "mm") -> ShownUnit:
 def shown(mm: float) -> str:
     """One length with its unit."""
     return unit_of(mm).length(mm)
+
+
+def rounded_up(limit: float) -> float:
+    """A limit that is proposed: at least that large, with two digits."""
+    step = 10.0 ** (floor(log10(limit)) - 1)
+    return float(f"{step * ceil(limit / step):.2g}")
 
 
 def from_to(before_mm: float, after_mm: float, decimals_before: int = 3) -> str:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations, pairwise
+from math import ceil
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.pose import AXES, Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import singularity_margin
+from hexacell.lengths import rounded_up, shown
 from hexacell.limits.leg_limits import ROUNDING
 from hexacell.motion.path_check import is_clear
 from hexacell.robot.model import Robot
@@ -27,6 +29,9 @@ LARGEST_SHARE = 0.5
 LARGEST_SHARE_UNKNOWN = 0.5
 """Share of the error at the worst task pose that records may leave of what the drawing does; with more the
 robot would hardly be better."""
+
+NAMED_PARTS = 3
+"""Largest parts of an uncertainty that are named."""
 
 TIMES_THE_LIMIT = 10.0
 """Times the limit that the error may be predicted to be, with two sigma: a plan that leaves more measures
@@ -106,7 +111,7 @@ def optimisation_failures(plan: Plan) -> Iterator[list[HexacellError]]:
         failures += found
         yield found
     if not failures:
-        yield [*_no_better(plan)]
+        yield [*_beyond_any_records(plan)] or [*_no_better(plan)]
 
 
 def measuring_failures(plan: Plan) -> Iterator[list[HexacellError]]:
@@ -203,6 +208,32 @@ def _expected_zero(plan: Plan, belief: RobotBelief, point: int) -> GaugeZero:
     return estimate_gauge_zero(belief, actual.poses, actual.joints, np.zeros((1, 3)))
 
 
+def _beyond_any_records(plan: Plan) -> Iterator[HexacellError]:
+    """The failure that what is not known of the machine exceeds a limit, however much is measured."""
+    budget, limits = plan.planned_budget, plan.settings.acceptance.of_errors
+    if budget is None:
+        return
+    parts = sorted((line for line in budget.lines if line.combined_mm), key=lambda one: -one.combined_mm)
+    names = ", ".join(f"{one.effect.name} ({shown(one.combined_mm)})" for one in parts[:NAMED_PARTS])
+    floor = budget.floor
+    for key, error in (("position_mm", floor.position), ("orientation_deg", floor.orientation)):
+        least, limit = limits.guard_band_factor * error.expanded, getattr(limits, key)
+        if least > limit:
+            yield UsageError(
+                f"no number of records reaches {key} = {limit:g}: what they cannot show makes {least:.3g} "
+                f"at the worst task pose by itself, most of it by {names}",
+                subject="[acceptance]",
+                action=f"State {key} = {rounded_up(least):g} or more; or have these parts measured, and "
+                "state smaller sizes of them in [uncertainty], and of repeatability in [noise]",
+            )
+
+
+def records_for(limit: float, records: int, by_noise: float, other: float) -> int | None:
+    """How many records a limit needs, of which some leave errors ``by_noise`` and ``other``; or None."""
+    room = limit**2 - other**2
+    return None if room <= 0.0 else ceil(records * by_noise**2 / room)
+
+
 def _no_better(plan: Plan) -> Iterator[HexacellError]:
     """The failure that even well spread poses tell hardly more of the task poses than the drawing does.
 
@@ -217,12 +248,13 @@ def _no_better(plan: Plan) -> Iterator[HexacellError]:
     if end <= LARGEST_SHARE_UNKNOWN * now and COVERAGE_FACTOR * end <= TIMES_THE_LIMIT * limit:
         return
     records = sum(plan.forecaster.planned(start).values())
+    needed = records_for(limit / COVERAGE_FACTOR, records, end, plan.systematic_mm or 0.0)
     yield UsageError(
         f"{records} records leave an error of {end:.3g} mm at the worst task pose, one sigma, where the "
         f"limit is {limit:g} and the drawing with its tolerances leaves {now:.3g}",
         subject="[identification]",
-        action="Allow more tilt, more orientations, or points farther apart; gauges and encoders of "
-        "another noise need other figures in [noise]",
+        action=f"Allow {needed or 'more'} records, more tilt, or points farther apart; gauges and encoders "
+        "of another noise need other figures in [noise]",
     )
 
 

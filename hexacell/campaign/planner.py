@@ -29,7 +29,7 @@ from hexacell.campaign.pilots import CAUTION, FIRST_PILOT, MOST_PILOTS, MOST_TO_
 from hexacell.campaign.pose_chooser import PoseChooser, is_well_known
 from hexacell.campaign.pose_list import PoseList
 from hexacell.campaign.stopping_rules import Goal, StoppingRules
-from hexacell.campaign.task_accuracy import Task, planned_systematic_mm
+from hexacell.campaign.task_accuracy import Task, planned_budget
 from hexacell.cell.model import CellSettings
 from hexacell.design.search_effort import USUAL_EFFORT, SearchEffort
 from hexacell.errors import IdentifiabilityError, LimitError
@@ -40,6 +40,7 @@ from hexacell.measurements.records import deviation_of, joints_of
 from hexacell.motion.path_check import stands_within_limits
 from hexacell.motion.paths import find_route
 from hexacell.robot.model import Robot
+from hexacell.uncertainty.budget import UncertaintyBudget
 
 PROVISIONAL_SIGMA = float(np.radians(2.0))
 """Standard deviation of the platform's orientation, rad, beyond which the controller does not command
@@ -257,10 +258,17 @@ class Plan:
         )
 
     @cached_property
+    def planned_budget(self) -> UncertaintyBudget | None:
+        """The uncertainty at the end, systematic effects included; None where it is not known."""
+        sets = [self.planned_sets[point - 1] for point in self.points]
+        return planned_budget(self.robot, self.task, sets, self.earlier)
+
+    @property
     def systematic_mm(self) -> float | None:
         """Standard uncertainty by the systematic effects at the end; None where it is not known."""
-        sets = [self.planned_sets[point - 1] for point in self.points]
-        return planned_systematic_mm(self.robot, self.task, sets, self.earlier)
+        if not any(effect.size for effect in self.robot.effects):
+            return 0.0
+        return None if self.planned_budget is None else self.planned_budget.systematic_mm
 
     @cached_property
     def _last_out_of_reach(self) -> list[tuple[object, frozenset[int]]]:

@@ -153,21 +153,18 @@ def _are_taken(belief: RobotBelief, poses: PoseBatch) -> Mask:
     return np.asarray(np.isfinite(joints).all(axis=-1))
 
 
-def planned_systematic_mm(
+def planned_budget(
     robot: Robot, task: Task, sets: Sequence[PoseBatch], earlier: Mapping[str, Array] | None = None
-) -> float | None:
-    """The standard uncertainty by the systematic effects at the worst task pose, mm.
+) -> UncertaintyBudget | None:
+    """The uncertainty of the errors at the task poses, with the systematic effects.
 
     It is that of the result of all poses of the planned ``sets``, for a robot as its controller has it.
     Before all of them are measured the noise is larger by far. None where no such robot can be identified.
     """
     effects = [effect for effect in robot.effects if effect.size]
-    if not effects:
-        return 0.0
     records = [*chain.from_iterable(exact_records(robot, *one) for one in enumerate(sets, start=1))]
     try:
         found = estimate_online(robot.problem(MeasurementSet(tuple(records))))
-        budget = task.budget(found, robot.belief(found), effects, earlier)
+        return task.budget(found, robot.belief(found), effects, earlier)
     except HexacellError:
         return None
-    return None if budget is None else budget.systematic_mm

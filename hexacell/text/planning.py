@@ -1,22 +1,19 @@
 """Text for plans: what to measure next, what records gain, what a dry run of each mode predicts."""
 
-import math
 from collections.abc import Iterator, Sequence
 
 from drivers.interfaces import DeviceIdentity
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
+from hexacell.campaign.feasibility import records_for
 from hexacell.checks.quick_level import QuickAccuracy
 from hexacell.dry_run.campaign import QuickTrial
 from hexacell.dry_run.verdict_forecast import NOISE, WANTED, VerdictForecast
-from hexacell.lengths import shown, unit_of
+from hexacell.lengths import rounded_up, shown, unit_of
 from hexacell.measurements.records import RecordId
 from hexacell.services.offline import PlanTrial
 from hexacell.text.layout import duration
 from hexacell.text.measured_noise import averaging_lines
 from hexacell.verdict.decision import Verdict
-
-DIGITS = 2
-"""Number of digits of a limit that is proposed."""
 
 TRYING_PLAN = "Trying the plan on simulated robots within the tolerances, some seconds ..."
 
@@ -108,7 +105,7 @@ def plan_trial_lines(trial: PlanTrial) -> Iterator[str]:
                 f"{shown(result.expanded_mm)}, with the systematic effects of [uncertainty]."
             )
         if result.verdicts is not None:
-            yield from verdict_forecast_lines(result.verdicts)
+            yield from verdict_forecast_lines(result.verdicts, result.records)
         yield from averaging_lines(trial.averaging, trial.encoders_part_mm)
         if target_mm is not None and result.worst_sigma_mm > target_mm:
             yield f"That is not the target of {target_mm:g} mm: allow more records, points or tilt."
@@ -138,8 +135,8 @@ def preflight_lines(devices: Sequence[DeviceIdentity]) -> Iterator[str]:
     yield TRYING_PLAN
 
 
-def verdict_forecast_lines(forecast: VerdictForecast) -> Iterator[str]:
-    """How likely a healthy machine passes; if it is not, why, and what would help."""
+def verdict_forecast_lines(forecast: VerdictForecast, records: int) -> Iterator[str]:
+    """How likely a healthy machine passes by some records; if it is not, why, and what would help."""
     others = ", ".join(
         f"{verdict} {_percent(share)}"
         for verdict, share in forecast.probabilities.items()
@@ -151,33 +148,32 @@ def verdict_forecast_lines(forecast: VerdictForecast) -> Iterator[str]:
         f"{_percent(forecast.probabilities[Verdict.PASS])}{rest}."
     )
     if not forecast.is_wanted:
-        yield _warning(forecast)
+        yield _warning(forecast, records)
 
 
-def _warning(forecast: VerdictForecast) -> str:
+def _warning(forecast: VerdictForecast, records: int) -> str:
     """The limits that are too small with values that would do, and what would help."""
     wanted, present = forecast.passing, forecast.limits
     limits = []
     if wanted.position_mm > present.position_mm:
-        limits.append(f"position_mm = {_rounded_up(wanted.position_mm):g}")
+        limits.append(f"position_mm = {rounded_up(wanted.position_mm):g}")
     if wanted.orientation_deg > present.orientation_deg:
-        limits.append(f"orientation_deg = {_rounded_up(wanted.orientation_deg):g}")
+        limits.append(f"orientation_deg = {rounded_up(wanted.orientation_deg):g}")
     unit = unit_of(forecast.standard_mm)
     sizes = f"{unit.number(forecast.largest_part_mm)} of {unit.length(forecast.standard_mm)}"
     part = f"{forecast.largest_part} ({sizes})"
     remedy = "have it calibrated, or measure it, and state its size in [uncertainty]"
     if forecast.largest_part == NOISE:
-        remedy = "more records, or means of more readings, reduce it"
+        noise, whole = forecast.largest_part_mm, forecast.standard_mm
+        allowed = whole * min(1.0, present.position_mm / wanted.position_mm)
+        needed = records_for(allowed, records, noise, max(whole**2 - noise**2, 0.0) ** 0.5)
+        some = f"about {needed}" if needed and needed > records else "more"
+        remedy = f"{some} records instead of {records}, or means of more readings, reduce it so far"
     return (
         f"That is too little: a good machine fails these limits. {WANTED:.0%} would pass "
         f"{' and '.join(limits) or 'the limits'} in [acceptance]. The largest part of the uncertainty at "
         f"the worst task pose is the {part}: {remedy}."
     )
-
-
-def _rounded_up(limit: float) -> float:
-    step = 10.0 ** (math.floor(math.log10(limit)) - DIGITS + 1)
-    return float(f"{step * math.ceil(limit / step):.{DIGITS}g}")
 
 
 def _percent(share: float) -> str:

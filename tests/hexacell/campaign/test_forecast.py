@@ -8,7 +8,7 @@ import pytest
 from hexacell.campaign.budget import usual_move_seconds
 from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.forecast import PlannedInformation
-from hexacell.campaign.task_accuracy import planned_systematic_mm
+from hexacell.campaign.task_accuracy import planned_budget
 from hexacell.cell.uncertainty import UncertaintySettings
 from hexacell.config.interface import ControllerGeometry
 from hexacell.design.criteria import add_information
@@ -155,19 +155,19 @@ def test_it_is_that_of_a_campaign_that_was_carried_out(ordinary, paper) -> None:
 def test_an_earlier_result_shares_its_constant_effects(ordinary) -> None:
     """A prior that had the effects as well, and is much better known than the records make it."""
     sets, task = ordinary.planned_sets, ordinary.task
-    alone = planned_systematic_mm(ordinary.robot, task, sets)
+    alone = planned_budget(ordinary.robot, task, sets)
     known = replace(ordinary.robot.prior, covariance=1e-6 * ordinary.robot.prior.covariance)
     robot = replace(ordinary.robot, known=known)
     zero = np.zeros((35, 6))
-    unaware = planned_systematic_mm(robot, task, sets, {"scale of each encoder": zero})
-    aware = planned_systematic_mm(robot, task, sets, {"scale of each encoder": zero + 1e-3})
+    unaware = planned_budget(robot, task, sets, {"scale of each encoder": zero})
+    aware = planned_budget(robot, task, sets, {"scale of each encoder": zero + 1e-3})
     assert None not in {alone, unaware, aware}
-    assert aware != pytest.approx(unaware, rel=0.01)
+    assert aware.systematic_mm != pytest.approx(unaware.systematic_mm, rel=0.01)
 
 
 def test_a_task_that_nobody_reaches_has_no_uncertainty(ordinary) -> None:
     far = replace(ordinary.task, poses=ordinary.robot.from_commands([Pose(0.0, 0.0, 5000.0)]))
-    assert planned_systematic_mm(ordinary.robot, far, ordinary.planned_sets) is None
+    assert planned_budget(ordinary.robot, far, ordinary.planned_sets) is None
 
 
 SEED = {"identification__seed": 2}  # whose first robot can be measured

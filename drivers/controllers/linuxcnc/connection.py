@@ -274,7 +274,7 @@ class Connection:
     def _closed(self) -> ConnectionLost:
         what, action = "it was ended or restarted", "Start LinuxCNC if it does not run"
         if not self.server:  # it counts those that have left as well
-            what = "it ends, or takes no more clients than the --sessions that it was started with"
+            what = "it was ended, or takes no more clients than the --sessions that it was started with"
             action = "Restart LinuxCNC, with linuxcncrsh without --sessions"
         return ConnectionLost(f"closed the connection: {what}", subject=self.subject, action=action)
 

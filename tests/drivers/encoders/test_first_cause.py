@@ -113,7 +113,10 @@ DAMAGED.__cause__ = ValueError()
         (IndexError("of a line that was cut"), "no frame .*End other programs that read this port"),
         (DAMAGED, "no frame .*can't decode.*End other programs that read this port"),
         (can.CanOperationError("Network is down"), "Switch the CAN interface on"),
-        (can.CanOperationError("returned no data (multiple access on port?)"), "End other programs"),
+        (
+            can.CanOperationError("returned no data (multiple access on port?)"),
+            "Plug the CAN .*other program",
+        ),
         (OSError(19, "No such device"), "Check the CAN adapter, its cable"),
     ],
 )

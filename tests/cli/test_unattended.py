@@ -2,10 +2,18 @@
 
 import re
 import signal
+from unittest.mock import Mock
 
 import pytest
 
+from hexacell.cli.commands.unattended import begun_in_window
+from hexacell.cli.console import Console
 from hexacell.errors import ExitCode
+from hexacell.runs.run_folder import RunFolder
+from hexacell.services.run.calibration_run import RunRequest
+from procedures.calibration.calibration import Mode
+from procedures.engine.commands import UnattendedOperator
+from procedures.journal.journal import EvidenceLost
 
 pytestmark = pytest.mark.usefixtures("few_candidates")
 
@@ -64,6 +72,17 @@ def test_a_person_at_the_machine_may_run_it_in_quiet_hours(typed_here, short_cel
     assert outcome.code == ExitCode.USAGE
     assert "no accepted result" in outcome.err
     assert typed_here("history", short_cell.cell, "--json").document["runs"] == []
+
+
+@pytest.mark.slow
+def test_a_run_whose_journal_is_gone_had_begun_and_is_not_begun_again(cell, tmp_path) -> None:
+    folder = RunFolder(tmp_path / "run")
+    request = RunRequest(cell, folder, Mode.CHECK, UnattendedOperator(), keeps_hours=True)
+    begin = Mock(side_effect=EvidenceLost("the journal of this run is gone", action="Put it back"))
+    with pytest.raises(EvidenceLost):
+        begun_in_window(request, Console(), begin)
+    begin.assert_called_once_with()
+    assert not folder.path.exists()
 
 
 def test_a_signal_ends_the_waiting(start, short_cell) -> None:

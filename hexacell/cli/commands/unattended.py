@@ -39,6 +39,7 @@ from hexacell.services.unattended.schedules import (
 from hexacell.services.unattended.unattended_runs import local_now, refuse_quiet_hours, refused_start
 from hexacell.storage.atomic_files import read_text
 from hexacell.text.layout import duration, wrapped
+from procedures.journal.journal import is_evidence_lost
 from procedures.steps import events
 
 NOBODY = "nobody is notified; write [[notifications]] in the cell file"
@@ -67,7 +68,7 @@ def begun_in_window(
             refuse_quiet_hours(request.cell.settings, local_now())
             return begin()
         except HexacellError as error:
-            if request.folder.journal.is_file():
+            if request.folder.journal.is_file() or is_evidence_lost(error):
                 raise  # it had begun: its journal says the rest
             wait_s = refused_start(request, error, began, local_now())
             if wait_s is None:

@@ -42,6 +42,7 @@ _CAUSES = {
     **dict.fromkeys((errno.ECONNREFUSED, errno.EHOSTUNREACH, errno.ETIMEDOUT), _NO_SERVER),
     errno.EIO: ("cannot be opened: it has no device behind it", _ABSENT[1]),
     errno.ENOTTY: ("is no serial port, or has no control lines", "Correct port in the cell file"),
+    errno.EISDIR: ("is a folder", "Correct port in the cell file"),
 }
 
 

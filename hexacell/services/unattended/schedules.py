@@ -147,7 +147,8 @@ def _require_possible(cell: Cell, run: ScheduledRun) -> None:
             action='Fix gauges at every point and write placement = "fixed" in [stations]',
         )
     if not str(run.cell).isprintable():
-        raise UsageError("a path with control characters cannot be scheduled", subject=cell.path)
+        problem = "a path with control characters cannot be scheduled"
+        raise UsageError(problem, subject=cell.path, action="Rename the folder")
     if run.metrics is not None and not run.metrics.parent.is_dir():
         raise UsageError("the folder of the metrics does not exist", subject=run.metrics, action="Make it")
 

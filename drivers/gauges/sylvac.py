@@ -115,6 +115,9 @@ class SylvacGauge(SerialGauge):
         if received == PARITY:
             action = f"Check parity settings: {self.spec.protocol} uses {self.spec.line}"
             return self._error(WrongAnswer, "receives requests with wrong parity (ERR2)", action)
+        if VALUE_FRAME.fullmatch(received):  # never rejected as an answer to the request for one
+            action = "Switch its continuous sending off (OUT0)"
+            return self._error(WrongAnswer, f"answers a question for a setting with {received!r}", action)
         return super()._garbled(received)
 
 

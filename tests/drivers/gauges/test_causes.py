@@ -46,6 +46,7 @@ CAUSES = [
     (DIGIMATIC, ODD, 'parity = "O"'),
     (MUX, b"\x86\xf3\x1e\xe6\r", "bit 7 set. Check parity settings and baud rate: mux10 uses 9600"),
     (SYLVAC, b"\xff\xff\xff", "no characters. Check that its cable is wired right, and parity settings"),
+    (SYLVAC, b"+0.123\r", "answers a question for a setting with .*Switch its continuous sending off"),
     (CDI, b"\0\0\0\0\r"[:4] + b"\xff", "no characters"),
     (MUX, b"01A+0000.123\n", "which ends with LF, where CR is expected"),
     (CDI, b"+  2.1380, MM\n", "which ends with LF, where CR is expected"),

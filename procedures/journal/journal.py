@@ -122,7 +122,7 @@ class Journal(AbstractContextManager["Journal"]):
             self._digest, self._times = self._digest_of_file(), self._times_of_file()
         except BlockingIOError:
             os.close(self._descriptor)
-            raise CellBusy("another process writes this journal", subject=path) from None
+            raise CellBusy("another process writes this journal", subject=path, action="End it") from None
         except OSError as error:
             os.close(self._descriptor)
             raise self._cannot_open(error) from error

@@ -104,5 +104,5 @@ def _document(path: Path) -> Mapping[str, Any]:
             f"is damaged: {error}", subject=path, action="`hexacell fit` makes it again"
         ) from error
     if not isinstance(found, dict):
-        raise FileError("is no result of an identification", subject=path)
+        raise FileError("is no result of an identification", subject=path, action="Name another run")
     return found

@@ -29,6 +29,7 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.results.absorbed_terms import errors_of_geometry_alone
 from hexacell.results.result import IdentificationResult, LengthResult, legs_at
 from hexacell.robot.model import Robot
+from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.length_records import JudgedGeometry
 from hexacell.verdict.decision import Verdict, VerifiedAccuracy, worst_verdict
 from hexacell.verdict.either_side import places_on_either_side
@@ -155,7 +156,12 @@ def verify(settings: CellSettings, robot: Robot, found: Identification, held_out
         tests = confirmed(tests, updated, np.isin(updated.problem.labels[:, 0], held_out.confirming.points))
     if settings.encoders.are_of_controller and settings.controller.joints_include_zeros:
         tests = with_zeros_doubted(tests)
-    accuracy = verified_accuracy(settings, robot, found, updated, held_out.length)
+    belief = robot.belief(updated)
+    task = Task.of(settings, robot, belief).reachable(belief)
+    budget = task.budget(updated, belief, robot.effects, robot.known_effects)
+    accuracy = None
+    if budget is not None:
+        accuracy = _verified_accuracy(settings, robot, found, updated, task, budget, held_out.length)
     if accuracy is not None and (length := accuracy.length) is not None:
         sentence = "The records of the length check agree with each other."
         if not length.is_consistent:
@@ -171,17 +177,15 @@ def verify(settings: CellSettings, robot: Robot, found: Identification, held_out
         before_mm=before.mean_mm,
         after_mm=after.mean_mm,
         is_worse=worse,
-        is_better=is_worse(after, before, noise) or (not worse and _errs_less(settings, robot, updated)),
+        is_better=is_worse(after, before, noise) or (not worse and _errs_less(budget, robot, updated)),
     )
 
 
-def _errs_less(settings: CellSettings, robot: Robot, updated: Identification) -> bool:
+def _errs_less(budget: UncertaintyBudget | None, robot: Robot, updated: Identification) -> bool:
     """Whether the written geometry errs significantly less at the task poses than the one before it.
 
     By all records, which tell it where a few scattered deviations do not.
     """
-    belief = robot.belief(updated)
-    budget = Task.of(settings, robot, belief).budget(updated, belief, robot.effects, robot.known_effects)
     if budget is None or not robot.earlier:
         return False
     earlier = robot.mechanism.convention.free_parameters(robot.earlier[0].geometry)
@@ -192,20 +196,17 @@ def _errs_less(settings: CellSettings, robot: Robot, updated: Identification) ->
     return before.value - before.expanded > now.value + now.expanded
 
 
-def verified_accuracy(
+def _verified_accuracy(
     settings: CellSettings,
     robot: Robot,
     found: Identification,
     updated: Identification,
-    measured: LengthMeasurements | None = None,
-) -> VerifiedAccuracy | None:
+    task: Task,
+    budget: UncertaintyBudget,
+    measured: LengthMeasurements | None,
+) -> VerifiedAccuracy:
     """The error that the geometry of ``found`` makes at the task poses, by the updated estimate."""
-    belief = robot.belief(updated)
-    task = Task.of(settings, robot, belief).reachable(belief)
-    budget = task.budget(updated, belief, robot.effects, robot.known_effects)
-    if budget is None:
-        return None
-    length = None
+    belief, length = robot.belief(updated), None
     if measured is not None:
         covariance = updated.free_covariance * updated.goodness.noise_factor**2
         judged = JudgedGeometry(covariance, budget.parameter_columns)

@@ -259,11 +259,10 @@ def _continued(problem: Problem, before: Identification) -> Identification:
 
 def _start_poses(problem: Problem, before: Identification) -> PoseBatch | None:
     """Poses that close the previous estimate, to start the search; None if one is not found."""
-    old = problem.rows_of(before.problem.labels)
-    is_new = np.ones(problem.records, dtype=bool)
-    is_new[old] = False
-    new = np.flatnonzero(is_new)
+    rows = problem.rows_of(before.problem.labels)
+    old = rows[rows >= 0]
+    new = np.setdiff1d(np.arange(problem.records), old)
     solved = problem.commands[new].solve_poses(before.geometry, problem.joints[new])
     if not solved.found[problem.has_start_pose[new]].all():
         return None
-    return problem.commands.poses.with_rows(new, solved.poses).with_rows(old, before.poses)
+    return problem.commands.poses.with_rows(new, solved.poses).with_rows(old, before.poses[rows >= 0])

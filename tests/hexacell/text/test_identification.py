@@ -14,11 +14,6 @@ from hexacell.measurements.csv_file import write_measurements
 from hexacell.measurements.records import MeasurementSet
 
 
-@pytest.fixture(scope="module")
-def clean(visit):
-    return visit(seed=2).measured(0.01, seed=1)
-
-
 @pytest.fixture
 def fit(tmp_path, capsys):
     def run(measurements, *options, is_incomplete=False):
@@ -33,8 +28,8 @@ def fit(tmp_path, capsys):
     return run
 
 
-def test_the_report_has_every_free_parameter(fit, clean):
-    text = fit(clean).out
+def test_the_report_has_every_free_parameter(fit, noisy):
+    text = fit(noisy).out
     assert text.startswith("Good: the records agree with the stated noise.\n")
     lines = text.splitlines()
     named = [line.split()[0] for line in lines if line.endswith("sigma)")]
@@ -60,20 +55,20 @@ def test_undetermined_parameters_are_reported(fit, visit):
     assert text.count("not determined") > 10
 
 
-def test_a_second_visit_gives_a_repeatability(fit, clean):
-    again = replace(clean.records[1], orientation=99)
-    text = " ".join(fit(MeasurementSet((*clean.records, again))).out.split())
+def test_a_second_visit_gives_a_repeatability(fit, noisy):
+    again = replace(noisy.records[1], orientation=99)
+    text = " ".join(fit(MeasurementSet((*noisy.records, again))).out.split())
     assert "Repeatability: on returning to 1 pose the ball scatters by x 0.0000" in text
     assert "(1 degree of freedom)" in text
 
 
-def test_a_point_that_the_others_contradict_makes_a_fit_doubtful(clean, fit):
+def test_a_point_that_the_others_contradict_makes_a_fit_doubtful(noisy, fit):
     """The gauges of point 2 show 0.6 % too much; all records together still agree with the noise."""
     records = [
         replace(
             record, deviation=tuple((1.006 if record.point == 2 else 1.0) * mm for mm in record.deviation)
         )
-        for record in clean.records
+        for record in noisy.records
     ]
     document = json.loads(fit(MeasurementSet(tuple(records)), "--json").out)
     assert document["verdict"] == "not evaluated"

@@ -62,16 +62,13 @@ def propose(tmp_path, capsys):
     return run
 
 
-def test_next_says_which_records_it_leaves_out(propose, visit):
-    measured = visit(seed=2).measured(0.01, seed=1)
-    wrong = measured.records[17]
+def test_next_says_which_records_it_leaves_out(propose, noisy):
+    wrong = noisy.records[17]
     x, y, z = wrong.deviation
-    records = [
-        replace(wrong, deviation=(x, y, z + 1.0)) if one is wrong else one for one in measured.records
-    ]
-    spoilt = MeasurementSet(tuple(records))
+    false = replace(wrong, deviation=(x, y, z + 1.0))
+    spoilt = MeasurementSet(tuple(false if one is wrong else one for one in noisy.records))
     sentence = "Left out, as the other records contradict them: point 2, orientation 7."
     assert sentence in " ".join(propose(spoilt).split())
     assert json.loads(propose(spoilt, "--json"))["left_out"] == [[2, 7]]
-    assert "Left out" not in propose(measured)
-    assert json.loads(propose(measured, "--json"))["left_out"] == []
+    assert "Left out" not in propose(noisy)
+    assert json.loads(propose(noisy, "--json"))["left_out"] == []

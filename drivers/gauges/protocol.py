@@ -1,7 +1,5 @@
 """What a gauge protocol defines: the serial line, the display, the settings, and how a search finds it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from decimal import Decimal
@@ -99,7 +97,7 @@ class DisplayedValue:
     text: str
 
     @classmethod
-    def of(cls, sign: bytes, digits: bytes, frame: bytes, unit: Unit | None = None) -> DisplayedValue:
+    def of(cls, sign: bytes, digits: bytes, frame: bytes, unit: Unit | None = None) -> "DisplayedValue":
         """From the sign (``+``, ``-`` or blank) and the digits of an answer."""
         number = digits.strip().decode("ascii")
         value = float(number)
@@ -124,7 +122,7 @@ class GaugeState:
     scaling: bool | None = None
     battery_low: bool | None = field(default=None, compare=False)
 
-    def changes_since(self, before: GaugeState) -> tuple[str, ...]:
+    def changes_since(self, before: "GaugeState") -> tuple[str, ...]:
         """Each setting that differs from the known one ``before``, as text."""
         found = []
         for setting in fields(self):

@@ -1,7 +1,5 @@
 """What measuring costs in records and time, and how much of it may be spent."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Set
 from dataclasses import dataclass
@@ -49,7 +47,7 @@ class TimeModel:
     record_seconds: float
 
     @classmethod
-    def of(cls, settings: CellSettings, moves: float | None = None) -> TimeModel:
+    def of(cls, settings: CellSettings, moves: float | None = None) -> "TimeModel":
         """The durations that a cell file states, with ``moves`` a record, or as many as usual."""
         by_hand = settings.stations.placement == "by-hand"
         stated = settings.identification.seconds_per_record
@@ -107,7 +105,7 @@ class Budget:
     time_model: TimeModel
 
     @classmethod
-    def of(cls, settings: CellSettings) -> Budget:
+    def of(cls, settings: CellSettings) -> "Budget":
         """The budget that a cell file states."""
         plan = settings.identification
         return cls(plan.budget_records, plan.budget_minutes, TimeModel.of(settings))

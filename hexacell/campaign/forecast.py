@@ -8,8 +8,6 @@ complement:
     I = sum H^T V^-1 H - (sum H^T V^-1) (sum V^-1)^-1 (sum V^-1 H).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -150,7 +148,7 @@ class Forecaster:
         self,
         state: CampaignState,
         covariance: Array,
-        information: PlannedInformation,
+        information: "PlannedInformation",
         error: TaskError,
         point: int,
     ) -> list[tuple[float, float]]:
@@ -191,7 +189,7 @@ class PlannedInformation:
     bounds: NDArray[np.intp]
 
     @classmethod
-    def of(cls, sets: Sequence[PoseBatch], belief: RobotBelief) -> PlannedInformation:
+    def of(cls, sets: Sequence[PoseBatch], belief: RobotBelief) -> "PlannedInformation":
         """The records at the present estimate; poses it cannot reach are left out."""
         poses = PoseBatch.joined(sets)
         joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)

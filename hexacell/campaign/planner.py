@@ -5,8 +5,6 @@ selected by what is known by then, until the error at the task poses is small en
 or nothing is left that is worth measuring.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -121,7 +119,7 @@ class Plan:
         return pilots_per_departure(self.pose_list is not None)
 
     @cached_property
-    def cautious(self) -> Plan:
+    def cautious(self) -> "Plan":
         """This plan before the noise is measured, which may be larger than stated; poses are not listed."""
         robot, effort = replace(self.robot, noise=self.robot.noise.scaled(CAUTION)), self.effort
         listed = self.pose_list.at(self.points[0]) if self.pose_list is not None else ()

@@ -1,7 +1,5 @@
 """The predicted error at the poses where the robot will work."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
@@ -81,7 +79,7 @@ class Task:
     held: HeldParameters | None = None
 
     @classmethod
-    def of(cls, settings: CellSettings, robot: Robot, belief: RobotBelief) -> Task:
+    def of(cls, settings: CellSettings, robot: Robot, belief: RobotBelief) -> "Task":
         """The task of a cell; workspace poses are those that a robot as in ``belief`` can take."""
         points = PoseBatch.of(Pose(*point) for point in settings.identification.points)
         workspace = workspace_poses(belief, robot.frames.poses(points).positions)
@@ -89,7 +87,7 @@ class Task:
         poses = stated if len(stated) else workspace
         return cls(poses, workspace if len(workspace) else poses, robot.held)
 
-    def reachable(self, belief: RobotBelief) -> Task:
+    def reachable(self, belief: RobotBelief) -> "Task":
         """The poses that the estimated robot reaches."""
         return Task(_reachable(belief, self.poses), _reachable(belief, self.workspace), self.held)
 

@@ -1,7 +1,5 @@
 """Sections of the cell file on operation: archive, OPC UA, reports, unattended runs, notifications."""
 
-from __future__ import annotations
-
 import re
 from enum import StrEnum
 from typing import Literal
@@ -232,14 +230,14 @@ class NotificationSettings(Section):
         return topic
 
     @model_validator(mode="after")
-    def _leads_elsewhere(self) -> NotificationSettings:
+    def _leads_elsewhere(self) -> "NotificationSettings":
         hosts = () if self.url is None or self.link_local else hosts_of(self.url)
         if any(is_link_local(host, by_name=False) for host in hosts):
             raise broken_rule(LINK_LOCAL, "Correct it, or write link_local = true beside url on purpose")
         return self
 
     @model_validator(mode="after")
-    def _of_a_broker(self) -> NotificationSettings:
+    def _of_a_broker(self) -> "NotificationSettings":
         if self.topic is not None and self.url is not None and scheme_of(self.url) not in BROKERS:
             raise broken_rule("only MQTT has topics", "Remove topic, or write mqtts://host as the url")
         return self

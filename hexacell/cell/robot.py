@@ -1,7 +1,5 @@
 """Sections of the cell file: the mechanism with its drawing, and its controller with the geometry."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any, Literal, Self
 
@@ -177,7 +175,7 @@ class ControllerSettings(Section):
     angle_tolerance_deg: Positive = key(0.01, "largest angle difference at which a move has arrived, deg")
 
     @model_validator(mode="after")
-    def _files_are_together(self) -> ControllerSettings:
+    def _files_are_together(self) -> "ControllerSettings":
         files = (self.config, *(one.config for one in self.further_files))
         if twice := next((name for name in files if files.count(name) > 1), None):
             raise broken_rule(f"the file {twice} is named twice", "Name each file once")

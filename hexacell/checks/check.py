@@ -5,8 +5,6 @@ since; without such a result from the drawing. Poses are chosen for the error at
 ends as soon as that error and its uncertainty decide against the limit, or its budget is used.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -59,7 +57,7 @@ class ScaledEstimate:
     log_likelihood: float
 
     @classmethod
-    def of(cls, scale: float, estimate: OnlineEstimate, records: int) -> ScaledEstimate:
+    def of(cls, scale: float, estimate: OnlineEstimate, records: int) -> "ScaledEstimate":
         """An estimate of so many records; one that leaves some of them out is the least likely."""
         found = estimate.identification
         if found is None:

@@ -1,7 +1,5 @@
 """A change of the controller's config: proposed, and as written with its receipt."""
 
-from __future__ import annotations
-
 import difflib
 import io
 import os
@@ -215,7 +213,7 @@ class Receipt(JsonRecord):
     further: tuple[Path, ...] = ()
 
     @classmethod
-    def of(cls, folder: Path) -> Receipt:
+    def of(cls, folder: Path) -> "Receipt":
         """The receipt kept in a run folder; raises ``FileError``.
 
         Where folder and config were copied or moved together, it is of the config that is beside it now.
@@ -230,7 +228,7 @@ class Receipt(JsonRecord):
         return found.model_copy(update={"path": first, "further": tuple(further), "backup_folder": here})
 
     @classmethod
-    def for_change(cls, change: ConfigChange, backup_folder: Path) -> Receipt:
+    def for_change(cls, change: ConfigChange, backup_folder: Path) -> "Receipt":
         """The receipt that a commit of ``change`` keeps in ``backup_folder``."""
         same = change.model_dump(include={"path", "format", "sha256_before", "sha256_after"})
         return cls(**same, backup_folder=backup_folder.absolute(), further=change.paths[1:])

@@ -1,7 +1,5 @@
 """A kind of controller config: what the program needs from it, and the numbers in its text."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -34,7 +32,7 @@ class ControllerLimits(Frozen):
     joints: JointRanges | None = None
     axes: AxisRanges | None = None
 
-    def narrowed(self, other: ControllerLimits) -> ControllerLimits:
+    def narrowed(self, other: "ControllerLimits") -> "ControllerLimits":
         """What both allow."""
         joints, axes = self.joints or other.joints, self.axes or other.axes
         if self.joints and other.joints:

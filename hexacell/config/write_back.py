@@ -8,8 +8,6 @@ Of several files, each is replaced in a step of its own. What a process that die
 behind, the next one settles (:mod:`~hexacell.config.pending_write`).
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -126,7 +124,7 @@ def _back_up(receipt: Receipt, before: Contents, after: Contents) -> None:
     receipt.backup()
 
 
-def _replace(receipt: Receipt, replacement: Replacement) -> None:
+def _replace(receipt: Receipt, replacement: "Replacement") -> None:
     try:
         replacement.write()
     except BaseException as error:
@@ -143,7 +141,7 @@ def _replace(receipt: Receipt, replacement: Replacement) -> None:
 
 
 def _undo(
-    receipt: Receipt, replacement: Replacement, cause: BaseException, *, all_of_them: bool
+    receipt: Receipt, replacement: "Replacement", cause: BaseException, *, all_of_them: bool
 ) -> NoReturn:
     def keep(found: bytes) -> None:
         """Keep a version that no commit wrote beside the backup, if possible, so that it is not lost."""

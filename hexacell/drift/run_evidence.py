@@ -29,8 +29,6 @@ information A, and the information T of all. The gain ``u^2 / v`` of twice the l
 the most likely run and cause (Basseville and Nikiforov, Detection of Abrupt Changes, 1993, section 7.2.4).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -143,7 +141,7 @@ class CarriedPosterior(RunEvidence):
     """The evidence of all runs so far, with the prior."""
 
     @classmethod
-    def diffuse(cls, free: int, causes: int) -> CarriedPosterior:
+    def diffuse(cls, free: int, causes: int) -> "CarriedPosterior":
         """Nothing known of so many free parameters; shared causes have unit variance."""
         precision = np.diag([DIFFUSE**-2] * free + [1.0] * causes)
         return cls(precision, np.zeros(free + causes))
@@ -153,7 +151,7 @@ class CarriedPosterior(RunEvidence):
         """The estimate (s,)."""
         return np.linalg.solve(self.information, self.weighted)
 
-    def after(self, *runs: RunEvidence) -> CarriedPosterior:
+    def after(self, *runs: RunEvidence) -> "CarriedPosterior":
         """The posterior with some more runs."""
         information = sum((run.information for run in runs), self.information)
         return CarriedPosterior(information, sum((run.weighted for run in runs), self.weighted))
@@ -170,7 +168,7 @@ class CarriedPosterior(RunEvidence):
         is_seen = variance > LEAST_SHARE * own
         return np.where(is_seen, score / np.sqrt(np.where(is_seen, variance, 1.0)), np.nan)
 
-    def forgetting(self, causes: Array) -> CarriedPosterior:
+    def forgetting(self, causes: Array) -> "CarriedPosterior":
         """The posterior if the robot may just have changed by any amount along some causes (m, s)."""
         information, weighted = self.information, self.weighted
         for cause in causes:

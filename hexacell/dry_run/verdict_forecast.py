@@ -11,8 +11,6 @@ x the identification, h what is held and C0 the covariance of its tolerances. Ma
 the largest error J d over the task poses and its U by draws, as in a run (``docs/verdict.md``).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -70,7 +68,7 @@ class VerdictForecast:
         return self.probabilities[Verdict.PASS] >= WANTED
 
     @classmethod
-    def mean(cls, each: Sequence[VerdictForecast]) -> VerdictForecast:
+    def mean(cls, each: "Sequence[VerdictForecast]") -> "VerdictForecast":
         """The mean over some robots; the limits and the parts are those of the worst of them."""
         worst = max(each, key=lambda one: one.passing.position_mm)
         degrees = max(one.passing.orientation_deg for one in each)

@@ -1,7 +1,5 @@
 """What is known of the robot at one moment."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -70,7 +68,7 @@ class RobotBelief:
             moved = moved + term.pose_errors(at, unknown)[:, :3] @ self.terms.of(term.name)[0]
         return moved
 
-    def zeroed_at(self, shown_mm: tuple[float, float, float] | None) -> RobotBelief:
+    def zeroed_at(self, shown_mm: tuple[float, float, float] | None) -> "RobotBelief":
         """This belief with gauges that were zeroed where they show ``shown_mm`` along base x, y, z."""
         return self if shown_mm is None else replace(self, limits=self.limits.zeroed_at(shown_mm))
 
@@ -79,7 +77,7 @@ class RobotBelief:
         """Covariance (p + 6 m, p + 6 m) of the free parameters and of the coefficients of m terms."""
         return self.covariance if self.terms is None else self.terms.joint_covariance(self.covariance)
 
-    def knowing(self, joint_covariance: Array) -> RobotBelief:
+    def knowing(self, joint_covariance: Array) -> "RobotBelief":
         """The same estimate with another covariance of parameters and coefficients."""
         free = len(self.free)
         own, crossed = joint_covariance[:free, :free], joint_covariance[free:, :free]
@@ -180,7 +178,7 @@ class RobotBelief:
 
     def standing_at(
         self, command: PoseBatch, actual: ActualPoses, wanted: Array | None = None
-    ) -> RobotBelief:
+    ) -> "RobotBelief":
         """This belief with its limits widened where the robot is beyond them at a command (1)."""
         wanted = self.least_margins if wanted is None else wanted
         at = command, actual.poses, actual.joints, wanted

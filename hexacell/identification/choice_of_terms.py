@@ -11,8 +11,6 @@ Two terms that do the same to the records cannot be told apart: where exchanging
 ``DISTINCT`` in the logarithm, neither is taken.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import log
@@ -86,7 +84,7 @@ class _Search:
     scale: float = 1.0
 
     @classmethod
-    def of(cls, found: Identification, offered: Sequence[ModelTerm]) -> _Search:
+    def of(cls, found: Identification, offered: Sequence[ModelTerm]) -> "_Search":
         without = LinearCosts.at(replace(found.problem, terms=None), found.prediction)
         least = log(len(offered) / ERROR_OF_FIRST_KIND)
         records = found.placement

@@ -7,8 +7,6 @@ by what does the same to its leg's constraint, to first order, is the one that t
 with the platform at the same pose. Second order is below a millionth of the change of length.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -40,7 +38,7 @@ class ThermalExpansion:
     base_um_m_k: float = 0.0
     reference_c: Temperatures = (None,) * MEASURED_PARTS
 
-    def referred_to(self, measured: MeasurementSet) -> ThermalExpansion:
+    def referred_to(self, measured: MeasurementSet) -> "ThermalExpansion":
         """With the temperatures of the first records where none is stated."""
         columns = [shown[np.isfinite(shown)].tolist() for shown in measured.temperatures.T]
         pairs = zip(self.reference_c, columns, strict=True)

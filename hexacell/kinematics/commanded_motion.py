@@ -15,8 +15,6 @@ the limit of an axis says that every command at least as far out along it is ref
 cell file excludes may concern all that are near it. Any other refusal concerns that command alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -75,7 +73,7 @@ class RefusedCommands:
 
     commands: tuple[RefusedCommand, ...] = ()
 
-    def __or__(self, others: RefusedCommands) -> RefusedCommands:
+    def __or__(self, others: "RefusedCommands") -> "RefusedCommands":
         """These commands and others, each once."""
         return RefusedCommands(tuple(dict.fromkeys((*self.commands, *others.commands))))
 

@@ -5,8 +5,6 @@ that of legs as long as play and compliance make them under the weight: a leg th
 half its play, and by its compliance times its force.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
@@ -67,7 +65,7 @@ class Corrections:
         """Whether nothing is corrected."""
         return not any((*self.backlash, *self.play_mm, *self.compliance_um_n))
 
-    def taking(self, other: Corrections, kinds: Collection[CorrectionKind]) -> Corrections:
+    def taking(self, other: "Corrections", kinds: Collection[CorrectionKind]) -> "Corrections":
         """These with some kinds of others, and with their weight if a force is needed for one of them."""
         needs_forces = bool({CorrectionKind.PLAY, CorrectionKind.COMPLIANCE} & {*kinds})
         weight = other if needs_forces else self
@@ -92,7 +90,7 @@ class Corrections:
         for axis, value in zip("xyz", self.weight_centre_mm or (), strict=False):
             yield f"weight's centre {axis}", mm, value
 
-    def changes_to(self, after: Corrections, joint_unit: JointUnit) -> tuple[CorrectionChange, ...]:
+    def changes_to(self, after: "Corrections", joint_unit: JointUnit) -> tuple[CorrectionChange, ...]:
         """The numbers that are others in ``after``."""
         every = [*self.numbers(joint_unit)], [*after.numbers(joint_unit)]
         old, new = ({name: value for name, _, value in numbers} for numbers in every)

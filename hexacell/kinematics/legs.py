@@ -4,8 +4,6 @@ The distance of two legs is that of the segments between their joints (Lumelsky,
 Letters 21, 1985).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -44,7 +42,7 @@ class Legs:
     rotations: Array
     carriers: Array | None = None
 
-    def __getitem__(self, rows: Mask) -> Legs:
+    def __getitem__(self, rows: Mask) -> "Legs":
         carriers = None if self.carriers is None else self.carriers[rows]
         return Legs(self.base_joints[rows], self.platform_joints[rows], self.rotations[rows], carriers)
 

@@ -10,8 +10,6 @@ With the rotation vector ``(a, b, 0)``, ``t = sqrt(a^2 + b^2)``, ``s = sin t / t
     u = (1 - b^2 k, a b k, -b s),   w = (a b k, 1 - a^2 k, a s),   axis = (b s, -a s, cos t).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -121,7 +119,7 @@ class TurnedAxes:
     axis: Array
 
     @classmethod
-    def by(cls, turns: Array) -> TurnedAxes:
+    def by(cls, turns: Array) -> "TurnedAxes":
         """The axes by their turns (..., 2), rad."""
         a, b, angle, s, k = _sine_and_cosine(turns)
         return cls(

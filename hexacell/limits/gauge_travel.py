@@ -6,8 +6,6 @@ plates when all plungers are in the middle of their travels, so the same place s
 on the plates. Lengths are in mm, along base x, y, z.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -27,7 +25,7 @@ class GaugeRoom:
     upper: Three
 
     @classmethod
-    def symmetric(cls, distance_mm: float) -> GaugeRoom:
+    def symmetric(cls, distance_mm: float) -> "GaugeRoom":
         """Room of one distance on all sides."""
         return cls((-distance_mm,) * 3, (distance_mm,) * 3)
 
@@ -49,7 +47,7 @@ class GaugeRoom:
         below = deviations - spread >= share * np.array(self.lower)
         return np.asarray((above & below).all(axis=-1))
 
-    def widened(self, margin_mm: float) -> GaugeRoom:
+    def widened(self, margin_mm: float) -> "GaugeRoom":
         """This room with a margin on all sides."""
         x, y, z = (one - margin_mm for one in self.lower)
         u, v, w = (one + margin_mm for one in self.upper)

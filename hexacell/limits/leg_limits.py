@@ -4,8 +4,6 @@ A passive joint (ball joint or universal joint) lets a leg turn within a cone ab
 what carries the joint: at one end the slider, which does not turn, or the crank, at the other the platform.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -78,7 +76,7 @@ class LegLimits:
         turns = np.full(12, turn)
         return turns if self.distance_mm == 0.0 else np.append(turns, turn * radius_mm)
 
-    def including(self, margins: Array, wanted: Array | float = 0.0) -> LegLimits:
+    def including(self, margins: Array, wanted: Array | float = 0.0) -> "LegLimits":
         """These limits, widened where the :meth:`margins` (m,) at a pose are less than wanted (m,)."""
         missing = np.maximum(0.0, wanted - margins + ROUNDING)
         if not missing.any():

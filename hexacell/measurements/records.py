@@ -1,7 +1,5 @@
 """Measurements: records of joint variables and of the deviation of the ball from a reference."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -92,7 +90,7 @@ class MeasurementSet:
     def __len__(self) -> int:
         return len(self.records)
 
-    def subset(self, rows: NDArray[np.intp]) -> MeasurementSet:
+    def subset(self, rows: NDArray[np.intp]) -> "MeasurementSet":
         """The records in some rows."""
         return MeasurementSet(tuple(self.records[row] for row in rows.tolist()))
 

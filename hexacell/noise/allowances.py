@@ -8,8 +8,6 @@ what is not known of the geometry (:mod:`.ball_by_encoders`), is a gauge that sl
 moved.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -100,7 +98,7 @@ class Allowances:
 
     def since(
         self, reference: Pose, before: Array, now: Array, unknown: Array | None = None, readings: int = 0
-    ) -> ReferenceChange:
+    ) -> "ReferenceChange":
         """The change of two readings (9,) at one reference: gauges x, y, z, mm, then the encoders.
 
         ``unknown`` is how far each joint (6,) may be from where it was taken to be in both together. The
@@ -130,7 +128,7 @@ class Allowances:
             walk_mm=noise.walk_mm,
         )
 
-    def between_visits(self, reference: Pose, visits: Array) -> tuple[ReferenceChange, ...]:
+    def between_visits(self, reference: Pose, visits: Array) -> "tuple[ReferenceChange, ...]":
         """The changes between m visits (m, 9) of one reference, as m - 1 that are independent."""
         return tuple(self.since(reference, np.zeros(9), one) for one in contrasts(visits))
 

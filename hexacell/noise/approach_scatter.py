@@ -12,8 +12,6 @@ For each source one variance more is estimated by restricted maximum likelihood,
 (``docs/method.md``, Noise).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -157,7 +155,7 @@ def approach_scatter(
     return found.model_copy(update={"source": source, "unit": unit, "excess": excess, "stops": stops})
 
 
-def _stops(visits: _Visits, variances: Array) -> float:
+def _stops(visits: "_Visits", variances: Array) -> float:
     """One standard deviation of where a joint stops; zero where the variances of encoders explain it."""
     squares, freedom = np.diag(visits.products)[3:], visits.freedom
     if chi_square_exceedance(LEGS * freedom, float(np.sum(squares / variances))) >= SEEN:

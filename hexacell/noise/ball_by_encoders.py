@@ -10,8 +10,6 @@ and what the encoders show with that of their noise. A difference of the gauges 
 cause than where the joints are.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,7 +41,7 @@ class BallByEncoders:
     @classmethod
     def at(
         cls, robot: Robot, belief: RobotBelief, command: PoseBatch, shown: Array | None = None
-    ) -> BallByEncoders:
+    ) -> "BallByEncoders":
         """Near a command (1) of a robot, in the frame convention; where its encoders show (6,) there.
 
         Another geometry may have commanded it. Zero is no reading.

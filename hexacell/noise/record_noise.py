@@ -17,8 +17,6 @@ has the standard error of its degrees of freedom; with 55 records that is within
 Sources: Patterson and Thompson 1971; Horn, Horn and Duncan 1975 (the fixed point).
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Collection
 from dataclasses import dataclass, replace
@@ -165,7 +163,7 @@ class _Equations:
     information: Array
 
     @classmethod
-    def at(cls, found: Identification, variances: Array) -> _Equations:
+    def at(cls, found: Identification, variances: Array) -> "_Equations":
         """Evaluate at variances (2,), mm^2, with the parameters refitted under them."""
         by_joints = found.prediction.by_joints
         encoder_noise, gauge_noise = np.sqrt(variances).tolist()

@@ -11,8 +11,6 @@ differ more, the gauges drift: after n readings by ``V + s^2 n I``, a random wal
 Source: Draper and Smith, Applied Regression Analysis, 3rd ed. 1998, chapter 2 (pure error).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -94,7 +92,7 @@ class Repeats:
         changes: Sequence[ReferenceChange],
         noise: Noise,
         found: Identification | None = None,
-    ) -> Repeats:
+    ) -> "Repeats":
         """By visits of one reference, changes of readings at others, and what was found with that noise."""
         seen = np.inf if approaches is None else float(LEGS * (approaches.visits - 1))
         is_measured = approaches is not None and approaches.source is not None

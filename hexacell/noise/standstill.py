@@ -8,8 +8,6 @@ scatter than the steps of the display has the standard deviation of rounding, st
 Sources: Rosner, Technometrics 25 (1983) 165-172; JCGM 100, F.2.2.1.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -116,7 +114,7 @@ class _Line:
     lever: float
 
     @classmethod
-    def through(cls, values: Array, kept: Mask) -> _Line:
+    def through(cls, values: Array, kept: Mask) -> "_Line":
         places = np.arange(len(values)) - np.mean(np.flatnonzero(kept))
         around = values - np.mean(values[kept])
         lever = float(np.sum(places[kept] ** 2))

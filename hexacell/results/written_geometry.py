@@ -5,8 +5,6 @@ tool frames were taught with an earlier geometry. The one written is in the fram
 move least against that (:mod:`~hexacell.identification.diagnostics.frame_alignment`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -39,7 +37,7 @@ class TaskDisplacement(Frozen):
     is_within_limits: bool
 
     @classmethod
-    def of(cls, moved: PoseErrors, limits: AcceptanceSettings) -> TaskDisplacement | None:
+    def of(cls, moved: PoseErrors, limits: AcceptanceSettings) -> "TaskDisplacement | None":
         """Displacement over n poses; None without any."""
         if not len(moved.angles):
             return None

@@ -1,7 +1,5 @@
 """The model of one robot: what the cell file and the controller's config state together."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -186,7 +184,7 @@ class Robot:
             terms,
         )
 
-    def with_errors_of(self, settings: CellSettings) -> Robot:
+    def with_errors_of(self, settings: CellSettings) -> "Robot":
         """The robot with the noise and the systematic effects that some settings state."""
         effects, terms = stated_effects(settings), stated_terms(settings)
         return replace(self, noise=noise_of(settings), effects=effects, terms=terms)
@@ -195,7 +193,7 @@ class Robot:
         """A geometry in the convention's frames, in the frames of the controller's config."""
         return self.mechanism.change_frames(geometry, self.frames.inverse())
 
-    def with_controller(self, written: Geometry, corrections: Corrections | None = None) -> Robot:
+    def with_controller(self, written: Geometry, corrections: Corrections | None = None) -> "Robot":
         """The robot once its controller has a ``written`` geometry, in frames of that geometry's own.
 
         Without ``corrections`` the controller keeps those that it has.
@@ -214,7 +212,7 @@ class Robot:
             earlier=(*before, *self.earlier),
         )
 
-    def with_provisional(self, geometry: Geometry, *, is_used: bool = True) -> Robot:
+    def with_provisional(self, geometry: Geometry, *, is_used: bool = True) -> "Robot":
         """The robot once its controller was given a geometry in the convention's frames for a while.
 
         It commands with it, unless it has its own back (``is_used`` is false).

@@ -4,8 +4,6 @@ The cell is the bundled one with Table 1's drawing. Each robot is built after it
 uniform within the tolerances, the same for all that is compared.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -168,7 +166,7 @@ class Spread:
     task_mm: float
 
     @classmethod
-    def of(cls, found: Sequence[RecordsAccuracy]) -> Spread:
+    def of(cls, found: Sequence[RecordsAccuracy]) -> "Spread":
         """The spread of some accuracies."""
         errors = [one.largest_mm for one in found]
         return cls(

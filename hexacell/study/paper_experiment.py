@@ -12,8 +12,6 @@ many orientations are measured that this program chooses at the same points, wit
 paper's simulations.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -154,7 +152,7 @@ class Reduction:
     chosen: float
 
     @classmethod
-    def of(cls, found: Sequence[Differences]) -> Reduction:
+    def of(cls, found: Sequence[Differences]) -> "Reduction":
         """The medians of the draws' differences."""
         of_draws = ([getattr(one, name) for one in found] for name in ("before", "paper", "ours", "chosen"))
         return cls(*(median(float(np.mean(one)) for one in draws if one) for draws in of_draws))

@@ -6,8 +6,6 @@ first m of them; each of three angles about fixed axes is drawn between plus and
 where a step changes nothing any more.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -160,7 +158,7 @@ class MedianErrors:
     ours_mm: float
 
     @classmethod
-    def of(cls, errors: Sequence[Errors]) -> MedianErrors:
+    def of(cls, errors: Sequence[Errors]) -> "MedianErrors":
         """The medians of the draws' errors."""
         settled = [one for one in errors if one.paper]
         return cls(
@@ -183,7 +181,7 @@ class PlannedSet:
     deviation_mm: float
 
     @classmethod
-    def of(cls, points: int, outcomes: Sequence[Outcome]) -> PlannedSet:
+    def of(cls, points: int, outcomes: Sequence[Outcome]) -> "PlannedSet":
         """The medians of the draws' outcomes."""
         exact, noisy = (
             MedianErrors.of([getattr(one, name) for one in outcomes]) for name in ("exact", "noisy")

@@ -12,8 +12,6 @@ What terms of the model beside the geometry do at the task is known as well, les
 corrects of it; what is not known of their coefficients is part of the noise, with that of the geometry.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -82,7 +80,7 @@ class UncertaintyBudget:
     @classmethod
     def of(
         cls, propagation: Propagation, effects: Iterable[Effect], scale: ScaleObservation | None = None
-    ) -> UncertaintyBudget:
+    ) -> "UncertaintyBudget":
         """The budget of an identification for the task of its propagation.
 
         An effect that the mechanism cannot have gets no line. A ``scale`` that a length check with the

@@ -11,8 +11,6 @@ chi-square distribution with 3 n - 6 degrees of freedom: a fixture that moved, o
 in between, do not agree with it. ``docs/uncertainty.md`` (Length check) has more.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -70,7 +68,7 @@ class LengthCheck:
         noise: Noise,
         judged: JudgedGeometry,
         effects: Iterable[Effect] = (),
-    ) -> LengthCheck:
+    ) -> "LengthCheck":
         """The check of a geometry.
 
         Args:

@@ -5,8 +5,6 @@ mounting would show zero, the ball's centre is in the place of that seat. Some c
 with the judged geometry: its covariance, and constant effects. All others act on these records alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
@@ -60,7 +58,7 @@ class LengthRecords:
     placement: RecordPlacement
 
     @classmethod
-    def of(cls, commanded: RecordPlacement, mountings: NDArray[np.int_]) -> LengthRecords:
+    def of(cls, commanded: RecordPlacement, mountings: NDArray[np.int_]) -> "LengthRecords":
         """Records whose poses are the commanded ones, under (nearly) the geometry that is judged.
 
         Raises:
@@ -101,7 +99,7 @@ class JudgedGeometry:
     covariance: Array
     parameter_columns: Mapping[str, Array]
 
-    def with_scale(self, mechanism: Mechanism, geometry: Geometry) -> JudgedGeometry:
+    def with_scale(self, mechanism: Mechanism, geometry: Geometry) -> "JudgedGeometry":
         """With what a common scale did to it: if nothing else is known, the geometry took up all of it."""
         if COMMON_SCALE in self.parameter_columns:
             return self

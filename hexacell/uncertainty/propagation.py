@@ -12,8 +12,6 @@ the same in both, so that their columns are added, never averaged away. What an 
 chi-square is ``e^T M e``, with M the weights less what stations and parameters absorb.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -88,7 +86,7 @@ class Propagation:
         workspace: PoseBatch,
         earlier: Mapping[str, Array] | None = None,
         zeros: IdentifiedZeros | None = None,
-    ) -> Propagation:
+    ) -> "Propagation":
         """Linearize at an identification whose estimate reaches all task and workspace poses.
 
         ``earlier`` has the :meth:`parameter_columns` of the estimate that was the prior of this one.

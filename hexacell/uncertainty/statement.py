@@ -6,8 +6,6 @@ Monte Carlo method): U is the half-width about the stated value that holds 95 % 
 whose size was measured with few degrees of freedom is drawn from a t-distribution (JCGM 101, 6.4.9).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -47,7 +45,7 @@ class TaskErrors:
     measured: tuple[tuple[Array, float], ...] = ()
 
     @classmethod
-    def of(cls, jacobian: Array, difference: Array, covariance: Array, systematic: Array) -> TaskErrors:
+    def of(cls, jacobian: Array, difference: Array, covariance: Array, systematic: Array) -> "TaskErrors":
         """The errors, by a jacobian (n, 6, p), of a geometry that differs by (p,) from the estimate.
 
         ``covariance`` (p, p) is that of the estimate, and ``systematic`` (n, 6, k) are effects beside it.

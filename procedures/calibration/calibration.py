@@ -6,8 +6,6 @@ the verdict on a calibration, measures two seats. Nothing here uses hardware or 
 resumption and its replay compute alike.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -79,7 +77,7 @@ class Calibration:
         if self.mode is not Mode.OPTIMISE and self.robot.identifies is not ParameterChoice.ALL:
             object.__setattr__(self, "robot", replace(self.robot, identifies=ParameterChoice.ALL))
 
-    def known(self, state: RunState) -> Knowledge:
+    def known(self, state: RunState) -> "Knowledge":
         """What is known of the robot in a state of the run; one object as long as nothing new is learnt."""
         vector, lent, proposed = self.robot.mechanism.parameters.vector, state.provisional, state.proposed
         return self._knowledge(
@@ -94,12 +92,12 @@ class Calibration:
         )
 
     @cached_property
-    def at_start(self) -> Knowledge:
+    def at_start(self) -> "Knowledge":
         """What is known before anything is measured."""
         return Knowledge(self, self.robot.refused)
 
     @cached_property
-    def _knowledge(self) -> Callable[..., Knowledge]:
+    def _knowledge(self) -> "Callable[..., Knowledge]":
         # What was searched and estimated for a step serves the next one; a run returns to what it knew when
         # a provisional geometry is taken back.
         return lru_cache(maxsize=4)(partial(Knowledge, self))

@@ -1,7 +1,5 @@
 """The devices of one cell, together: open, read, kept fresh for screens, closed."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import time
@@ -42,7 +40,7 @@ _log = logging.getLogger(__name__)
 class LiveValue(Generic[Result]):
     """The latest value of one device, or the problem that it had after that."""
 
-    def __init__(self, live: LiveValues) -> None:
+    def __init__(self, live: "LiveValues") -> None:
         self.value: Result | None = None
         self.problem = ""
         self._live = live

@@ -7,8 +7,6 @@ The controller is supervised whenever it must stay enabled. That is not the case
 or reloads its config: there the driver itself verifies every step.
 """
 
-from __future__ import annotations
-
 import asyncio
 from collections import defaultdict
 from collections.abc import Callable, Sequence
@@ -146,7 +144,7 @@ class Guards:
         return GuardLimits(guards.stale_s, plate, rest, self.settings.mechanism.words)
 
     def _pollers(
-        self, *, controller: bool = False, encoders: bool = True, gauges: tuple[WatchedGauge, ...] = ()
+        self, *, controller: bool = False, encoders: bool = True, gauges: "tuple[WatchedGauge, ...]" = ()
     ) -> PolledDevices:
         devices, guards = self.devices, self.settings.guards
         watched = WatchedController(devices, self.clock, guards.following, guards.stale_s)
@@ -162,7 +160,7 @@ class Guards:
             stop_input=DevicePoller(STOP_LINE, devices.stop_reason),
         )
 
-    def _watched_gauges(self, watched: WatchedSet) -> tuple[WatchedGauge, ...]:
+    def _watched_gauges(self, watched: WatchedSet) -> "tuple[WatchedGauge, ...]":
         zero_mm = watched.zero_mm
         if zero_mm is None or not watched.is_watched:
             return ()

@@ -11,8 +11,6 @@
        |- a guard tripped   -> stop the robot, latch, wait for the action's end, cancel it
 """
 
-from __future__ import annotations
-
 import asyncio
 import shutil
 from collections.abc import Awaitable, Callable
@@ -105,7 +103,7 @@ class MotionSupervisor:
             finally:
                 await cancel_and_wait(task)
 
-    async def _result(self, task: asyncio.Future[Result], monitor: GuardMonitor) -> Result:
+    async def _result(self, task: asyncio.Future[Result], monitor: "GuardMonitor") -> Result:
         try:
             return await task
         except HexacellError as error:

@@ -1,7 +1,5 @@
 """A guard that tripped: which, why, and the next action."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -40,7 +38,7 @@ class Trip:
     causes: tuple[HexacellError, ...] = field(default=(), compare=False)
     stop_failure: str = ""
 
-    def as_error(self) -> GuardTripped:
+    def as_error(self) -> "GuardTripped":
         """The error to raise for it."""
         return (DriftTripped if self.guard is Guard.DRIFT else GuardTripped)(self)
 

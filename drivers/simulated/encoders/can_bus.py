@@ -1,7 +1,5 @@
 """The simulated CAN bus: one thread that receives frames, runs timers and sends frames."""
 
-from __future__ import annotations
-
 import logging
 import sched
 import threading
@@ -65,7 +63,7 @@ class SimulatedCanBus(canopen.Network):
         data: bytes,
         period: float,
         remote: bool = False,  # noqa: ARG002
-    ) -> PeriodicFrame:
+    ) -> "PeriodicFrame":
         """Send a frame periodically from the thread of the bus; canopen would start another thread."""
         return PeriodicFrame(self, can_id, data, period)
 

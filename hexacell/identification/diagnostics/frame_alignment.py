@@ -18,8 +18,6 @@ finds them with the derivatives at X, which give the exact gradient: a small tur
 |dw|``, however large dw is.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -47,11 +45,11 @@ class PoseErrors:
     angles: Array
 
     @classmethod
-    def of_squares(cls, squares: Array) -> PoseErrors:
+    def of_squares(cls, squares: Array) -> "PoseErrors":
         """The errors by squares of components (n, 6): positions, mm^2, then rotation vectors, rad^2."""
         return cls(np.sqrt(squares[:, :3].sum(axis=-1)), np.sqrt(squares[:, 3:].sum(axis=-1)))
 
-    def times(self, factor: float) -> PoseErrors:
+    def times(self, factor: float) -> "PoseErrors":
         """All errors multiplied by a factor."""
         return PoseErrors(factor * self.distances_mm, factor * self.angles)
 

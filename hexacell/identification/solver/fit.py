@@ -23,8 +23,6 @@ Rank-Deficient and Discrete Ill-Posed Problems, 1998 (release of the prior). Set
 program's own method.
 """
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass, replace
 
@@ -235,7 +233,7 @@ class _Iterate:
     is_last: bool = False
 
     @classmethod
-    def at(cls, problem: Problem, precision: Array, prediction: Prediction, damping: float) -> _Iterate:
+    def at(cls, problem: Problem, precision: Array, prediction: Prediction, damping: float) -> "_Iterate":
         elimination = NuisanceElimination(problem, prediction.weights)
         linear = elimination.system(prediction.residuals, prediction.jacobian)
         masks = prediction.singular, np.zeros(problem.records, dtype=bool)
@@ -250,7 +248,7 @@ class _Iterate:
         """F for residuals (n, 3), mm, under the weights of this iterate."""
         return float(self.elimination.cost(residuals) + from_centre @ self.precision @ from_centre)
 
-    def damped(self) -> _Iterate | Termination:
+    def damped(self) -> "_Iterate | Termination":
         """The same parameters with more damping."""
         damping = self.damping * self.growth
         if damping > LARGEST_DAMPING:

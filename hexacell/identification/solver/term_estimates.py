@@ -1,7 +1,5 @@
 """What an identification says of the terms beside the geometry: coefficients and their uncertainty."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,7 +31,7 @@ class TermEstimates:
     @classmethod
     def at(
         cls, problem: Problem, taken: TakenTerms, prediction: Prediction, covariance: Array
-    ) -> TermEstimates:
+    ) -> "TermEstimates":
         """The best coefficients at a minimum of the cost.
 
         Args:
@@ -53,7 +51,7 @@ class TermEstimates:
         return cls(taken.terms, best, spread @ own @ spread.T, spread @ crossed)
 
     @classmethod
-    def expected(cls, terms: tuple[ModelTerm, ...], parameters: int) -> TermEstimates:
+    def expected(cls, terms: tuple[ModelTerm, ...], parameters: int) -> "TermEstimates":
         """What is known of terms before records, beside a number of free parameters."""
         spread, mean = spread_of(terms), mean_of(terms)
         return cls(terms, mean, spread @ spread.T, np.zeros((len(mean), parameters)))

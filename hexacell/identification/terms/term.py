@@ -7,8 +7,6 @@ are known as a part that all legs share and a part of each of them, both normal 
 that is stated of the term.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
@@ -53,11 +51,11 @@ class ModelTerm:
     needs_directions: bool = False
     on_either_side: ErrorsOfSizes | None = None
     weight: Weight | None = None
-    of_weight: Callable[[Weight], ModelTerm] | None = None
+    of_weight: "Callable[[Weight], ModelTerm] | None" = None
     mean: Array = field(default_factory=lambda: np.zeros(LEGS))
     sigma: Array | None = None
 
-    def identified_as(self, values: Array, sigma: Array) -> ModelTerm:
+    def identified_as(self, values: Array, sigma: Array) -> "ModelTerm":
         """The term with coefficients (6,) as they were identified, with what is not known of them."""
         return replace(self, mean=values, sigma=sigma)
 

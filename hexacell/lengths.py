@@ -28,9 +28,9 @@ class ShownUnit:
         """A size without the unit."""
         return f"{self.per_unit * size:{sign}.{self.decimals}f}"
 
-    def length(self, size: float) -> str:
+    def length(self, size: float, sign: str = "") -> str:
         """A size with the unit."""
-        return f"{self.number(size)} {self.name}"
+        return f"{self.number(size, sign)} {self.name}"
 
     def limit(self, size: float) -> str:
         """A limit, which has the digits that were stated."""
@@ -55,9 +55,9 @@ def unit_of(*sizes: float | None, unit: str = "mm") -> ShownUnit:
     return UM if 0.0 < largest < SMALLEST_MM else MM
 
 
-def shown(mm: float) -> str:
-    """One length with its unit."""
-    return unit_of(mm).length(mm)
+def shown(size: float, sign: str = "", unit: str = "mm") -> str:
+    """One size with its unit."""
+    return unit_of(size, unit=unit).length(size, sign)
 
 
 def rounded_up(limit: float) -> float:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from hexacell.identification.terms.finding import Finding
 from hexacell.kinematics.corrections import NONE, CorrectionKind, Six
+from hexacell.lengths import ShownUnit, unit_of
 from hexacell.results.term_result import FoundTerms, TermResult
 from hexacell.text.layout import wrapped
 from hexacell.text.verdict import improvement_sentence
@@ -41,12 +42,17 @@ def found_sentence(found: FoundTerms) -> str:
 
 
 def _size(term: TermResult) -> str:
-    values, sigma = _smallest_to_largest(term.values), _smallest_to_largest(term.sigma)
-    return f"{term.name} of {values} {term.unit} (one sigma {sigma})"
+    unit = _unit(term)
+    values, sigma = (_smallest_to_largest(sizes or NONE, unit) for sizes in (term.values, term.sigma))
+    return f"{term.name} of {values} {unit.name} (one sigma {sigma})"
 
 
-def _smallest_to_largest(numbers: Six | None) -> str:
-    smallest, largest = f"{min(numbers or NONE):.3f}", f"{max(numbers or NONE):.3f}"
+def _unit(term: TermResult) -> ShownUnit:
+    return unit_of(*(term.values or ()), *(term.sigma or ()), unit=term.unit)
+
+
+def _smallest_to_largest(numbers: Six, unit: ShownUnit) -> str:
+    smallest, largest = unit.number(min(numbers)), unit.number(max(numbers))
     return smallest if smallest == largest else f"{smallest} to {largest}"
 
 
@@ -79,7 +85,8 @@ def _table(taken: Sequence[TermResult]) -> list[str]:
         return []
     lines = [f"  {'':20}" + "".join(f"{f'{leg}':>9}" for leg in range(1, 7))]
     for result in taken:
-        rows = {f"{result.name}, {result.unit}": result.values, "  +- (one sigma)": result.sigma}
+        unit = _unit(result)
+        rows = {f"{result.name}, {unit.name}": result.values, "  +- (one sigma)": result.sigma}
         for name, values in rows.items():
-            lines.append(f"  {name:20}" + "".join(f"{value:9.3f}" for value in values or ()))
+            lines.append(f"  {name:20}" + "".join(f"{unit.number(value):>9}" for value in values or ()))
     return lines

@@ -173,12 +173,12 @@ def improvement_sentence(
     """
     if expected is None:
         return ""
-    before, after = "the current config", f"0 +- {expected.expanded_mm:.2g} mm with this one"
+    before, after = "the current config", f"0 +- {shown(expected.expanded_mm)} with this one"
     if verified is not None:
         before, after = "the config before", f"{_with_u(verified.position)} with the new config"
         if verified.alone is not None:
             after = f"{_with_u(verified.alone)} with the best geometry alone, {after}"
-    return f"Largest position error at the task poses: {expected.now_mm:.3g} mm with {before}, {after}."
+    return f"Largest position error at the task poses: {shown(expected.now_mm)} with {before}, {after}."
 
 
 def _with_u(error: JudgedError) -> str:

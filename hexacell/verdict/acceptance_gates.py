@@ -6,6 +6,7 @@ from hexacell.cell.fields import Frozen
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
 from hexacell.identification.solver.chi_square import CONTRADICTED_RATIO, ChiSquareTest, ChiSquareVerdict
 from hexacell.identification.solver.result import GeometryEstimate
+from hexacell.lengths import shown
 
 
 class AcceptanceGate(Frozen):
@@ -44,7 +45,7 @@ def gates(
         expired: instruments whose certificate had expired when the run began; None without certificates.
         impossible: coefficients of what is not geometry that no machine has (:func:`impossible_terms`).
     """
-    names = ", ".join(f"{one.name} ({one.change:+.2f} {one.unit})" for one in violations)
+    names = ", ".join(f"{one.name} ({shown(one.change, '+', one.unit)})" for one in violations)
     checked = [
         AcceptanceGate(
             name="converged",
@@ -69,7 +70,7 @@ def gates(
         AcceptanceGate(  # a robot that moves far from where it did may collide
             name="small change",
             passed=change_mm <= largest_change_mm,
-            sentence=f"The largest change is {change_mm:.2f} mm, the choice of frames apart "
+            sentence=f"The largest change is {shown(change_mm)}, the choice of frames apart "
             f"(limit without a person {largest_change_mm:g} mm).",
             needs_person=True,
             needs_cell_name=not change_mm <= largest_change_mm,

@@ -7,7 +7,7 @@ from hexacell.identification.diagnostics.tolerance_check import ToleranceViolati
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
 from hexacell.kinematics.mechanism import FrameConvention
 from hexacell.kinematics.parameters import JointUnit
-from hexacell.lengths import shown
+from hexacell.lengths import shown, unit_of
 from hexacell.noise.record_noise import NoiseLevel, NoiseLevels
 from hexacell.results.result import legs_at
 from hexacell.verdict.acceptance_gates import residual_sentence
@@ -66,9 +66,11 @@ def noise_sentence(levels: NoiseLevels) -> str:
 
 
 def _noise_level(kind: str, level: NoiseLevel, unit: JointUnit) -> str:
+    in_unit = unit_of(level.stated, unit=unit)
+    stated = f"(stated {in_unit.limit(level.stated)})"
     if not level.is_resolved:
-        return f"{kind} below {level.at_most:.4f} {unit} (stated {level.stated:g})"
-    return f"{kind} {level.estimated:.4f} +- {level.standard_error:.4f} {unit} (stated {level.stated:g})"
+        return f"{kind} below {in_unit.length(level.at_most)} {stated}"
+    return f"{kind} {in_unit.number(level.estimated)} +- {in_unit.length(level.standard_error)} {stated}"
 
 
 def _verdict(assessed: Assessment) -> str:
@@ -87,8 +89,8 @@ def _verdict(assessed: Assessment) -> str:
         )
     if assessed.determines_too_little:
         return (
-            f"Incomplete: these records leave {2.0 * assessed.unknown_mm:.2g} mm of the error at the worst "
-            f"task pose unknown (two sigma; its limit is {assessed.limit_mm:g} mm). Measure at more "
+            f"Incomplete: these records leave {shown(2.0 * assessed.unknown_mm)} of the error at the worst "
+            f"task pose unknown (two sigma; its limit is {shown(assessed.limit_mm)}). Measure at more "
             "points, and in more orientations with larger tilts."
         )
     return _point_verdict(assessed) or _residual_verdict(found.goodness)
@@ -123,7 +125,7 @@ def _point_verdict(assessed: Assessment) -> str:
 
 def _beyond_tolerance(violations: Sequence[ToleranceViolation], convention: FrameConvention) -> str:
     names = ", ".join(
-        f"{convention.display_name(one.name)} is {one.change:+.2f} {one.unit} from the drawing "
+        f"{convention.display_name(one.name)} is {shown(one.change, '+', one.unit)} from the drawing "
         f"(tolerance {one.tolerance:g}, sigma {one.sigma:.2g})"
         for one in violations
     )
@@ -171,9 +173,9 @@ def _accuracy(assessed: Assessment) -> str:
         return "The robot can reach none of the task poses: no accuracy can be stated."
     where = "task poses" if assessed.task_named else "poses across the workspace"
     before, after = accuracy.before.position_rms_mm, accuracy.after.position_rms_mm
-    now = f"{before:.3g}" if before >= NEGLIGIBLE_MM else f"below {NEGLIGIBLE_MM:g}"
+    now = shown(before) if before >= NEGLIGIBLE_MM else f"below {shown(NEGLIGIBLE_MM)}"
     return (
-        f"At {len(accuracy.poses)} {where} the position error is now {now} mm (rms), and {after:.2g} mm "
+        f"At {len(accuracy.poses)} {where} the position error is now {now} (rms), and {shown(after)} "
         "with the identified geometry (one sigma)."
     )
 

@@ -111,8 +111,9 @@ def encoder_slip(point: str, change: ReferenceChange, unit: str) -> Trip | None:
 
 def slip_in_words(change: ReferenceChange, leg: int, unit: str) -> str:
     """What an encoder that slipped shows back at a reference."""
-    limit = change.chance_joints[leg]
+    limit, moved = change.chance_joints[leg], change.joints[leg]
+    shown_in = unit_of(limit, moved, unit=unit)
     return (
-        f"q{leg + 1} shows {change.joints[leg]:+.3f} {unit}, more than {limit:.3f} by chance, and the "
-        "gauges deny that it moved"
+        f"q{leg + 1} shows {shown_in.length(moved, '+')}, more than {shown_in.number(limit)} by chance, "
+        "and the gauges deny that it moved"
     )

@@ -11,6 +11,7 @@ from hexacell.identification.data_faults.hypotheses import (
 )
 from hexacell.identification.data_faults.stepwise_selection import Selection, UncorrectableFaultError
 from hexacell.identification.solver.result import GAUGES, DataFault, DataFaultKind
+from hexacell.lengths import shown
 from hexacell.measurements.records import Deviation, RecordId
 
 NAMED_SHARE = 0.3
@@ -66,8 +67,8 @@ def _rejected_record(test: DeletionTest) -> DataFault:
     if test.kind is DataFaultKind.MISMATCHED_JOINTS and test.leg:
         leg, off = test.leg
         fact = (
-            f"q{leg} is {off:+.3f} mm off its place for the commanded pose, unlike in the point's other "
-            "records; the record is left out"
+            f"q{leg} is {shown(off, '+')} off its place for the commanded pose, unlike in the point's "
+            "other records; the record is left out"
         )
         action = "Check whether q1 to q6 belong to another pose, or measure it again"
     elif test.offset_mm is None:
@@ -125,10 +126,10 @@ def _wrong_readings(kind: DataFaultKind, gauges: str, offset_mm: Deviation) -> s
             return f"{_names(gauges)} read in inches"
     if gauges:
         offset = offset_mm[GAUGES.index(gauges)]
-        return f"gauge {gauges} is {offset:+.3f} mm off what all other records predict"
-    x, y, z = offset_mm
+        return f"gauge {gauges} is {shown(offset, '+')} off what all other records predict"
+    x, y, z = (shown(one, "+") for one in offset_mm)
     return (
-        f"the gauges are x {x:+.3f}, y {y:+.3f}, z {z:+.3f} mm off what all other records predict: "
+        f"the gauges are x {x}, y {y}, z {z} off what all other records predict: "
         "more than one of them is wrong, or an encoder"
     )
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from drivers.interfaces import DeviceIdentity
 from hexacell.cell.fields import CertificateSettings
+from hexacell.lengths import shown
 from hexacell.services.history.reported_run import ReportedRun
 from hexacell.text.measured_noise import measured_noise_sentences, reversal_sentence, worsening_sentence
 from hexacell.text.report import results, statement
@@ -69,14 +70,14 @@ def conditions_chapter(run: ReportedRun) -> Chapter:
         worse = "" if found.worsening is None else worsening_sentence(found.worsening)
         reversal = "" if found.reversal is None else reversal_sentence(found.reversal)
         noise += tuple(f"{one[:1].upper()}{one[1:]}." for one in (worse, reversal) if one)
-    columns = ("Set of records", "records", "largest deviation, mm", "drift of the gauges, mm")
+    columns = ("Set of records", "records", "largest deviation", "drift of the gauges")
     # The sets whose reference was read again, with how far the gauges had drifted by then.
     rows = tuple(
         (
             key.name,
             str(len(measured.samples)),
-            f"{max(abs(value) for one in measured.samples for value in one.deviation_mm):.3f}",
-            f"{max(map(abs, measured.drift_mm)):.3f}",
+            shown(max(abs(value) for one in measured.samples for value in one.deviation_mm)),
+            shown(max(map(abs, measured.drift_mm))),
         )
         for key, measured in state.sets.items()
         if measured.drift_mm is not None and measured.samples

@@ -13,6 +13,7 @@ from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.result import Termination
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
+from hexacell.lengths import shown
 from hexacell.verdict.acceptance_gates import gates
 from hexacell.verdict.verification import DeviationStatistics, is_worse
 
@@ -86,8 +87,8 @@ def test_a_rod_far_outside_its_tolerance_is_named_with_its_sign(judged, shifted)
     """A good residual is no proof: a user of another machine found rods 13 mm too short."""
     gate = judged(shifted(l3=-13.0, S1y=30.0), largest_change_mm=100.0)["within tolerance"]
     assert not gate.passed
-    assert "l3 (-13.00 mm)" in gate.sentence
-    assert re.search(r"S1y \(\+\d\d\.\d\d mm\)", gate.sentence)
+    assert "l3 (-13.000 mm)" in gate.sentence
+    assert re.search(r"S1y \(\+\d\d\.\d+ mm\)", gate.sentence)
 
 
 def test_the_ball_tolerance_does_not_apply_to_a_single_joint(judged, shifted):
@@ -100,8 +101,15 @@ def test_the_change_is_from_the_controllers_geometry(judged, identified, paper):
     assert judged(largest_change_mm=change + 0.01)["small change"].passed
     gate = judged(largest_change_mm=5.0)["small change"]
     assert not gate.passed
-    assert f"largest change is {change:.2f} mm" in gate.sentence
+    assert f"largest change is {shown(change)}" in gate.sentence
     assert judged(largest_change_mm=1.0, before=identified.geometry)["small change"].passed
+
+
+def test_changes_of_a_precise_robot_are_shown_in_micrometres(identified):
+    found = gates(
+        identified.estimate, (), residuals=identified.goodness, change_mm=0.004, largest_change_mm=0.1
+    )
+    assert "largest change is 4.00 um" in found[-1].sentence
 
 
 def test_nan_in_the_geometry_fails_the_gates(judged, identified):

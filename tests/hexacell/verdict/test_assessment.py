@@ -66,7 +66,7 @@ def visited_twice(measurements, scatter_mm, seed=0):
 def test_a_good_result_has_the_verdict_first_and_then_the_accuracy(good):
     verdict, accuracy, *more = findings(good)
     assert verdict.startswith("Good: the records agree")
-    assert "At 6 task poses the position error is now 19 mm (rms)" in accuracy
+    assert "At 6 task poses the position error is now 19.025 mm (rms)" in accuracy
     assert f"{good.accuracy.after.position_rms_mm:.2g} mm with the identified geometry" in accuracy
     assert more == []
 

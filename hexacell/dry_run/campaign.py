@@ -24,6 +24,7 @@ from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.robot.virtual_robot import VirtualRobot, robots_within_tolerances
 from hexacell.uncertainty.budget import UncertaintyBudget
+from hexacell.verdict.acceptance_gates import gates
 
 MOST_TRIED = 6
 """Number of robots that are tried, where some cannot be identified."""
@@ -200,7 +201,7 @@ class _Outcome:
 
 
 def _carry_out(plan: Plan, truth: Geometry, number: int) -> _Outcome | None:
-    """The outcome for one robot; None if it is not identified."""
+    """The outcome for one robot; None if it is not identified, or a gate of a run would refuse it."""
     random = np.random.default_rng([plan.settings.identification.seed, number])
     campaign = VirtualCampaign(plan, VirtualRobot(plan.robot, truth, random))
     try:
@@ -211,6 +212,9 @@ def _carry_out(plan: Plan, truth: Geometry, number: int) -> _Outcome | None:
         return None
     found = estimate.of_records_alone()
     if found is None or not found.problem.is_determined:
+        return None
+    violations = plan.robot.tolerance_violations(found.estimate)
+    if any(gate.refuses for gate in gates(found.estimate, violations, residuals=found.goodness)):
         return None
     zeros, belief = plan.robot.identified_zeros(found), plan.robot.belief(found)
     belief = belief if zeros is None else replace(belief, covariance=zeros.free_covariance)

@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from hexacell.cell.fields import Frozen
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
 from hexacell.identification.solver.chi_square import CONTRADICTED_RATIO, ChiSquareTest, ChiSquareVerdict
@@ -22,14 +24,19 @@ class AcceptanceGate(Frozen):
     needs_person: bool = False
     needs_cell_name: bool = False
 
+    @property
+    def refuses(self) -> bool:
+        """Whether it is not met, and no person can accept that just by agreeing."""
+        return not self.passed and (self.needs_cell_name or not self.needs_person)
+
 
 def gates(
     identified: GeometryEstimate,
     violations: Sequence[ToleranceViolation],
     *,
     residuals: ChiSquareTest,
-    change_mm: float,
-    largest_change_mm: float,
+    change_mm: float = 0.0,
+    largest_change_mm: float = np.inf,
     expired: Sequence[str] | None = None,
     impossible: Sequence[str] = (),
 ) -> tuple[AcceptanceGate, ...]:
@@ -40,7 +47,7 @@ def gates(
         violations: of the drawing's tolerances.
         residuals: the chi-square test of the residuals.
         change_mm: the largest change of a parameter of the controller's, in the best choice of frames:
-            other frames are no other robot.
+            other frames are no other robot. By default nothing is changed.
         largest_change_mm: what may change without a person.
         expired: instruments whose certificate had expired when the run began; None without certificates.
         impossible: coefficients of what is not geometry that no machine has (:func:`impossible_terms`).
@@ -67,15 +74,19 @@ def gates(
             needs_person=True,
             needs_cell_name=True,
         ),
-        AcceptanceGate(  # a robot that moves far from where it did may collide
-            name="small change",
-            passed=change_mm <= largest_change_mm,
-            sentence=f"The largest change is {shown(change_mm)}, the choice of frames apart "
-            f"(limit without a person {largest_change_mm:g} mm).",
-            needs_person=True,
-            needs_cell_name=not change_mm <= largest_change_mm,
-        ),
     ]
+    if np.isfinite(largest_change_mm):  # a robot that moves far from where it did may collide
+        sentence = f"The largest change is {shown(change_mm)}, the choice of frames apart "
+        is_small = change_mm <= largest_change_mm
+        checked.append(
+            AcceptanceGate(
+                name="small change",
+                passed=is_small,
+                sentence=f"{sentence}(limit without a person {largest_change_mm:g} mm).",
+                needs_person=True,
+                needs_cell_name=not is_small,
+            )
+        )
     if impossible:
         sentence = " ".join(f"No machine has {one}." for one in impossible)
         checked.append(AcceptanceGate(name="physical", passed=False, sentence=sentence))

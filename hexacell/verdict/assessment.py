@@ -20,11 +20,12 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.noise.measured_noise import MeasuredNoise
 from hexacell.noise.record_noise import NoiseLevels, Repeatability, noise_levels, repeatability
 from hexacell.results.result import ExpectedImprovement
-from hexacell.results.term_result import corrections_for, term_results
+from hexacell.results.term_result import corrections_for, impossible_terms, term_results
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.possible_causes import PossibleCause, possible_causes
 from hexacell.uncertainty.statement import COVERAGE_FACTOR
+from hexacell.verdict.acceptance_gates import AcceptanceGate, gates
 
 SEPARATED_PAIRS = 5
 """Number of the strongest correlations for which a separating measurement is searched."""
@@ -49,6 +50,7 @@ class Assessment:
         points: each point's records predicted by the others, where those determine the geometry.
         measured_noise: at the start of the run that took the records; None where that is not known.
         possible_causes: causes of residuals that are too large, the largest share first.
+        impossible: what was found beside the geometry that no machine has.
         zeros: where these alone are identified; ``found`` is the estimate of all, which tests the data.
     """
 
@@ -69,6 +71,7 @@ class Assessment:
     zeros: IdentifiedZeros | None = None
     unknown_mm: float = 0.0
     limit_mm: float = np.inf
+    impossible: tuple[str, ...] = ()
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -76,15 +79,22 @@ class Assessment:
         return (self.zeros or self.found).undetermined
 
     @property
+    def gates(self) -> tuple[AcceptanceGate, ...]:
+        """Those of a run, but for the size of the change: nothing is written."""
+        found, impossible = self.found, self.impossible
+        return gates(
+            found.estimate, self.tolerance_violations, residuals=found.goodness, impossible=impossible
+        )
+
+    @property
     def refused(self) -> bool:
-        """Whether the geometry must not be used, regardless of the other checks."""
-        contradicted = self.found.goodness.ratio > CONTRADICTED_RATIO and not self.does_not_repeat
-        return contradicted or bool(self.tolerance_violations)
+        """Whether a gate of a run refuses the geometry."""
+        return any(gate.refuses for gate in self.gates)
 
     @property
     def is_usable(self) -> bool:
-        """Whether the solver converged, nothing refuses the geometry, and the task poses are known."""
-        return self.found.converged and not self.refused and not self.determines_too_little
+        """Whether no gate refuses the geometry, and the task poses are known."""
+        return not self.refused and not self.determines_too_little
 
     @property
     def determines_too_little(self) -> bool:
@@ -157,4 +167,5 @@ def assess(
         zeros=zeros,
         unknown_mm=0.0 if error is None else error.worst(belief.covariance),
         limit_mm=settings.acceptance.position_mm,
+        impossible=tuple(impossible_terms(robot.terms, term_results(found))),
     )

@@ -82,11 +82,12 @@ def _verdict(assessed: Assessment) -> str:
     if assessed.does_not_repeat:
         return _no_gain(assessed)
     if assessed.refused:
-        return (
-            f"Refused: the residuals are {found.goodness.ratio:.0f} times the stated noise, and no single "
-            "mistake explains them. Check that the drawing, the controller's config and the branch are "
-            "this machine's, and that the ball and the gauges are clamped."
+        why = (
+            f"the residuals are {found.goodness.ratio:.0f} times the stated noise, and no single mistake "
+            "explains them. Check that the drawing, the controller's config and the branch are this "
+            "machine's, and that the ball and the gauges are clamped."
         )
+        return f"Refused: {assessed.gates[-1].sentence if assessed.impossible else why}"
     if assessed.determines_too_little:
         return (
             f"Incomplete: these records leave {shown(2.0 * assessed.unknown_mm)} of the error at the worst "

@@ -58,6 +58,7 @@ def fit_document(assessed: Assessment) -> dict[str, Any]:
         "accuracy": _accuracy(assessed),
         "uncertainty": assessed.budget and _budget(assessed.budget),
         "refused": assessed.refused,
+        "gates": [gate.model_dump() for gate in assessed.gates],
         "possible_causes": [asdict(cause) for cause in assessed.possible_causes],
         "beyond_tolerance": [asdict(violation) for violation in assessed.tolerance_violations],
     }

@@ -113,6 +113,10 @@ def test_a_few_undetermined_parameters_are_named(good, monkeypatch):
 def test_a_solver_that_did_not_converge_gives_no_result(good):
     solution = replace(good.found.solution, termination=Termination.STUCK)
     stuck = replace(good, found=replace(good.found, solution=solution))
+    assert [gate["name"] for gate in fit_document(stuck)["gates"] if not gate["passed"]] == ["converged"]
+    impossible = replace(good, impossible=("a negative weight",))
+    assert findings(impossible)[0] == "Refused: No machine has a negative weight."
+    assert not impossible.is_usable
     assert findings(stuck)[0] == f"No result: the solver ended because {Termination.STUCK.value}."
     assert not stuck.is_usable
 

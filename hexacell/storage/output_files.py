@@ -51,6 +51,7 @@ PICTURE_MARK = b"<!-- made by hexacell study, which replaces this file -->\n"
 PICTURE = OutputKind("a picture of a study", re.compile(re.escape(PICTURE_MARK) + rb"\Z"))
 SERVED_MARK = b"# made by hexacell simulate, which replaces this file\n"
 SERVED_CELL = OutputKind("a cell file of `simulate`", re.compile(rb"\A" + re.escape(SERVED_MARK)))
+UNIT = OutputKind("a unit of systemd", re.compile(rb"\A# Written by `hexacell schedule` for "))
 NEW_CELL = OutputKind("a new cell file", None)
 
 

@@ -76,6 +76,8 @@ def test_no_output_replaces_a_cell_a_config_a_journal_or_a_note(
     for target in (*theirs, copied, note, link, nothing):
         outcome = typed_here(command, *given, option, target)
         assert (outcome.code, target.name in outcome.err) == (2, True), (target, outcome.err)
+    if command == "schedule":
+        assert typed_here(command, *given, "--folder", run).code == 2
     assert {path: path.read_bytes() for path in before} == before
     assert not (tmp_path / "absent").exists()
 

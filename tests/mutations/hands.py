@@ -54,7 +54,9 @@ def words(command: str, **named: object) -> list[str]:
 
 def not_ours(place: Place, draw: random.Random) -> Path:
     """What no option wrote: a file, a folder, a link or another name of either, a device, a pipe."""
-    theirs, made = draw.choice(files_of(place.root)), place.cell / draw.choice((Path(), RUN)) / "odd.html"
+    # An empty file is nobody's.
+    theirs = draw.choice([one for one in files_of(place.root) if one.stat().st_size])
+    made = place.cell / draw.choice((Path(), RUN)) / "odd.html"
     match draw.randrange(8):
         case 0 | 1:
             return theirs
@@ -78,7 +80,7 @@ def output_named(templates: Templates, place: Place, draw: random.Random) -> Att
         if target.is_fifo():
             reader.callback(os.close, os.open(target, os.O_RDWR))
         command = words(draw.choice(OUTPUTS), cell=place.cell / CELL, run=place.cell / RUN)
-        return attempt([*command, target], place)
+        return attempt([*command, target], place, ("outside/hexacell-*",))
 
 
 def run_with_a_link(templates: Templates, place: Place, draw: random.Random) -> Attempt:

@@ -22,6 +22,7 @@ from hexacell.services.unattended.scheduled_run import (
     timer_text,
 )
 from hexacell.storage import atomic_files
+from hexacell.storage.output_files import UNIT, OutputFile
 
 SYSTEM_UNITS = Path("/etc/systemd/system")
 USER_UNITS = Path(".config/systemd/user")
@@ -177,14 +178,12 @@ def _cell_of(path: Path) -> Path | None:
 
 
 def _require_ours(path: Path, cell: Path) -> None:
-    if not path.exists():
-        return
-    other = _cell_of(path)
-    if other is None:
-        raise UsageError("this file is not of `hexacell schedule`", subject=path, action="Move it away")
-    if other != cell:
+    OutputFile(path, UNIT).require()
+    if path.exists() and (other := _cell_of(path)) != cell:
         raise UsageError(
-            f"this is the schedule of {other}", subject=path, action="Give one of the cells another name"
+            f"this is the schedule of {other or 'another cell'}",
+            subject=path,
+            action="Give one of the cells another name",
         )
 
 

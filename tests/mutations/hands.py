@@ -2,11 +2,10 @@
 
 import os
 import random
-from contextlib import ExitStack
 from pathlib import Path
 
 from tests.mutations.attempts import Attempt, Place, attempt
-from tests.mutations.texts import ADDRESSES, SIGNS
+from tests.mutations.texts import ADDRESSES, NO_TEXT, SIGNS
 from tests.mutations.trials import (
     CELL,
     CONFIG,
@@ -17,9 +16,6 @@ from tests.mutations.trials import (
     files_of,
     move_out_of_reach,
 )
-
-NO_TEXT = "\udcff"
-"""A byte in the name of a file that is no UTF-8."""
 
 OUTPUTS = (
     "run {cell} --unattended --mode check --events", "status {cell} --metrics", "status {cell} --log-file",
@@ -47,14 +43,14 @@ TYPED = (
 )  # fmt: skip
 
 
-def words(command: str, **named: object) -> list[str]:
-    """A command with names put in, which may have any signs in them."""
-    return [word.format(**named) for word in command.split()]
+def typed(commands: tuple[str, ...], place: Place, draw: random.Random, **named: object) -> list[str]:
+    """One of the commands; the names in it may have any signs."""
+    names = {"cell": place.cell / CELL, "run": place.cell / RUN, **named}
+    return [word.format(**names) for word in draw.choice(commands).split()]
 
 
 def not_ours(place: Place, draw: random.Random) -> Path:
     """What no option wrote: a file, a folder, a link or another name of either, a device, a pipe."""
-    # An empty file is nobody's.
     theirs = draw.choice([one for one in files_of(place.root) if one.stat().st_size])
     made = place.cell / draw.choice((Path(), RUN)) / "odd.html"
     match draw.randrange(8):
@@ -76,11 +72,10 @@ def output_named(templates: Templates, place: Place, draw: random.Random) -> Att
     place.refill(templates.small, templates.small)
     move_out_of_reach(place.cell / CELL)
     target = not_ours(place, draw)
-    with ExitStack() as reader:
-        if target.is_fifo():
-            reader.callback(os.close, os.open(target, os.O_RDWR))
-        command = words(draw.choice(OUTPUTS), cell=place.cell / CELL, run=place.cell / RUN)
-        return attempt([*command, target], place, ("outside/hexacell-*",))
+    reader = os.open(target if target.is_fifo() else os.devnull, os.O_RDWR)
+    found = attempt([*typed(OUTPUTS, place, draw), target], place, ("outside/hexacell-*",))
+    os.close(reader)
+    return found
 
 
 def run_with_a_link(templates: Templates, place: Place, draw: random.Random) -> Attempt:
@@ -90,21 +85,18 @@ def run_with_a_link(templates: Templates, place: Place, draw: random.Random) -> 
     path = draw.choice([*files_of(run.parent), run / "report.html", run / "proposal.json"])
     if path.exists():
         path.rename(moved)
-    others = (place.cell / CONFIG, place.cell / CELL, moved.with_name("canary"), moved.parent)
-    path.symlink_to(draw.choice((moved, moved, *others)))
-    return attempt(words(draw.choice(OF_RUNS), cell=place.cell / CELL, run=run), place, OF_A_RUN)
+    path.symlink_to(draw.choice((moved, moved, place.cell / CONFIG, place.cell / CELL, moved.parent)))
+    return attempt(typed(OF_RUNS, place, draw), place, OF_A_RUN)
 
 
 def odd_argument(templates: Templates, place: Place, draw: random.Random) -> Attempt:
-    """An address, or signs that act on a terminal, in an argument or in the names of files."""
+    """An address, or signs that act on a terminal or are none, in an argument or in the names of files."""
     place.refill(templates.small, templates.small)
     move_out_of_reach(place.cell / CELL)
     sign = f"a{draw.choice((*SIGNS, NO_TEXT))}z"
     odd, csv, run = (place.cell / name for name in (f"{sign}.toml", f"{sign}.csv", RUN.with_name(sign)))
-    odd.write_bytes((place.cell / CELL).read_bytes())
-    (place.cell / RECORDS).rename(csv)
-    (place.cell / RUN).rename(run)
-    text, cell = draw.choice((sign, *ADDRESSES)), place.cell / CELL
-    return attempt(
-        words(draw.choice(TYPED), cell=cell, odd=odd, csv=csv, run=run, text=text), place, OF_A_RUN
-    )
+    for path, name in ((CELL, odd), (RECORDS, csv), (RUN, run)):
+        (place.cell / path).rename(name)
+    (place.cell / CELL).write_bytes(odd.read_bytes())
+    text = draw.choice((sign, *ADDRESSES))
+    return attempt(typed(TYPED, place, draw, odd=odd, csv=csv, run=run, text=text), place, OF_A_RUN)

@@ -4,13 +4,15 @@ import json
 import random
 import re
 from collections.abc import Callable, Sequence
+from functools import partial
 from unicodedata import category
 
 SIGNS = (
-    "\x1b[2J", "\x1b]0;t\x07", "\x1bP1$r\x1b\\", "\x9b31m", "\a\b", "\r", "\u202e", "\u2066", "\u200b",
-    "\u2028",
+    "\x1b[2J", "\x1b]0;t\x07", "\x1bP1$r\x1b\\", "\x9b31m", "\a\b", "\r", "\u202e\u2066", "\u200b", "\u2028"
 )  # fmt: skip
 """What acts on a terminal, or hides how a line reads."""
+NO_TEXT = "\udcff"
+"""A byte in the name of a file that is no UTF-8."""
 
 ADDRESSES = (
     "http://[::1/", "http://[::1]:99999/", "https://user:pass@127.0.0.1:9/a?b=c#d", "http://127.0.0.1:-1/",
@@ -38,20 +40,11 @@ STRANGE_TOKENS = (
     "1979-05-27T07:32:00Z", "null", "[[[[1]]]]", '"1.0"', "[" * 60 + "]" * 60, "=", "#", '"', "'", ",",
 )  # fmt: skip
 STRANGE_BYTES = (
-    b"\0",
-    b"\xff",
-    b"\xfe\xff",
-    b"\xed\xa0\x80",
-    *map(str.encode, SIGNS),
-    b"\x0c",
-    b"\x85",
-    b"\xef\xbb\xbf",
-)
+    b"\0", b"\xff", b"\xfe\xff", b"\xed\xa0\x80", b"\x0c", b"\x85", b"\xef\xbb\xbf", *map(str.encode, SIGNS)
+)  # fmt: skip
 
-_NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\d_]*(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w.])")
-_VALUE = re.compile(r"(?m)(?<==)[ \t]*(\"[^\"\n]*\"|\[[^\n]*\]|[^\s#\[\"]+)")
-_KEY = re.compile(r"(?m)^[\w.]+(?= =)")
-_ADDRESS = re.compile(r'(?<=url = |ort = |ost = )"[^"\n]*"')
+_NUMBER = r"(?<![\w.])[-+]?\d[\d_]*(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w.])"
+_VALUE = r"(?m)(?<==)[ \t]*(\"[^\"\n]*\"|\[[^\n]*\]|[^\s#\[\"]+)"
 _TOKEN = re.compile(r"[A-Za-z_]\w*|[-+]?\d[\d.eE+-]*|[\[\]{}=,\"'#.]")
 
 
@@ -87,17 +80,10 @@ def cut(data: bytes, draw: random.Random) -> bytes:
 def other_encoding(data: bytes, draw: random.Random) -> bytes:
     """Other line ends, a byte order mark, another encoding."""
     text = data.decode("utf-8", "replace")
-    return draw.choice(
-        (
-            data.replace(b"\n", b"\r\n"),
-            data.replace(b"\n", b"\r"),
-            b"\xef\xbb\xbf" + data,
-            b"\xef\xbb\xbf\xef\xbb\xbf" + data,
-            text.encode("utf-16"),
-            text.replace("\n", "\u2028").encode(),
-            data.rstrip(b"\n"),
-        )
-    )
+    marked = b"\xef\xbb\xbf" + data
+    lines = (data.replace(b"\n", b"\r\n"), data.replace(b"\n", b"\r"), data.rstrip(b"\n"))
+    others = (text.encode("utf-16"), text.replace("\n", "\u2028").encode(), marked, marked[:3] + marked)
+    return draw.choice(lines + others)
 
 
 def other_lines(data: bytes, draw: random.Random) -> bytes:
@@ -118,15 +104,10 @@ def other_lines(data: bytes, draw: random.Random) -> bytes:
     return b"".join(lines)
 
 
-def other_number(data: bytes, draw: random.Random) -> bytes:
-    """A number replaced by a strange one."""
-    return _one_replaced(_NUMBER, data, draw, STRANGE_NUMBERS)
-
-
 def scaled_number(data: bytes, draw: random.Random) -> bytes:
     """A number a thousand times too large, negative, or a little off."""
     text = data.decode("utf-8", "replace")
-    found = list(_NUMBER.finditer(text))
+    found = list(re.finditer(_NUMBER, text))
     if not found:
         return data
     one = draw.choice(found)
@@ -135,16 +116,6 @@ def scaled_number(data: bytes, draw: random.Random) -> bytes:
     )
     token = f"{number:.0f}" if re.fullmatch(r"[-+]?\d+", one[0]) and draw.random() < 0.7 else repr(number)
     return f"{text[: one.start()]}{token}{text[one.end() :]}".encode()
-
-
-def other_text(data: bytes, draw: random.Random) -> bytes:
-    """The content of a text in quotes replaced by a strange one."""
-    return _one_replaced(re.compile(r'(?<=")[^"\n]*(?=")'), data, draw, STRANGE_TEXTS)
-
-
-def other_type(data: bytes, draw: random.Random) -> bytes:
-    """The value of a key replaced by one of another type."""
-    return _one_replaced(_VALUE, data, draw, STRANGE_TOKENS + STRANGE_NUMBERS)
 
 
 def other_token(data: bytes, draw: random.Random) -> bytes:
@@ -160,25 +131,22 @@ def other_token(data: bytes, draw: random.Random) -> bytes:
     return f"{text[: one.start()]}{token}{text[one.end() :]}".encode()
 
 
-def other_address(data: bytes, draw: random.Random) -> bytes:
-    """An address in quotes replaced by a strange one."""
-    return _one_replaced(_ADDRESS, data, draw, [json.dumps(one) for one in ADDRESSES])
-
-
-def other_key(data: bytes, draw: random.Random) -> bytes:
-    """A key in quotes, with signs that no key has."""
-    return _one_replaced(_KEY, data, draw, [f'"{one}"' for one in STRANGE_TEXTS])
-
-
-def _one_replaced(
-    pattern: re.Pattern[str], data: bytes, draw: random.Random, tokens: Sequence[str]
-) -> bytes:
+def _one_replaced(pattern: str, tokens: Sequence[str], data: bytes, draw: random.Random) -> bytes:
     text = data.decode("utf-8", "replace")
-    found = list(pattern.finditer(text))
+    found = list(re.finditer(pattern, text))
     if not found:
         return data
     one = draw.choice(found)
     return f"{text[: one.start()]}{draw.choice(tokens)}{text[one.end() :]}".encode("utf-8", "surrogatepass")
+
+
+other_number = partial(_one_replaced, _NUMBER, STRANGE_NUMBERS)
+other_text = partial(_one_replaced, r'(?<=")[^"\n]*(?=")', STRANGE_TEXTS)
+other_type = partial(_one_replaced, _VALUE, STRANGE_TOKENS + STRANGE_NUMBERS)
+other_key = partial(_one_replaced, r"(?m)^[\w.]+(?= =)", [f'"{one}"' for one in STRANGE_TEXTS])
+other_address = partial(
+    _one_replaced, r'(?<=url = |ort = |ost = )"[^"\n]*"', [json.dumps(one) for one in ADDRESSES]
+)
 
 
 def other_cell(data: bytes, draw: random.Random) -> bytes:

@@ -163,12 +163,7 @@ def cell_file_scheduled(templates: Templates, place: Place, draw: random.Random)
     path = spoiled(templates.furnished, templates, place, CELL, draw)
     units = ["--folder", place.cell / "units"]
     command = draw.choice(
-        (
-            ["notify", path],
-            ["notify", path, "--test"],
-            ["schedule", path, "--daily", _time(draw), *units],
-            ["status", path],
-        )
+        (["notify", path], ["schedule", path, "--daily", _time(draw), *units], ["status", path])
     )
     return attempt([*command, *draw.choice(([], ["--json"]))], place)
 
@@ -189,14 +184,8 @@ def earlier_runs_listed(templates: Templates, place: Place, draw: random.Random)
     if path.exists():
         path.write_bytes(mutated_file(path, draw))
     cell = place.cell / CELL
-    command = draw.choice(
-        (
-            ["history", cell],
-            ["history", cell, "--drift"],
-            ["history", cell, "--show", "run"],
-            ["status", cell],
-        )
-    )
+    of_history = draw.choice(([], ["--drift"], ["--show", "run"]))
+    command = draw.choice((["history", cell, *of_history],) * 3 + (["status", cell],))
     return attempt([*command, *draw.choice(([], ["--json"]))], place)
 
 

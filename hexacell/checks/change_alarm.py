@@ -73,7 +73,8 @@ def change_alarm(
     first, _ = _single_causes(check, before, measurements, sound[:FIRST_RECORDS])
     every, legs = _single_causes(check, before, measurements, sound)
     leg = possible_legs(every.scores, every.sigmas, legs)[0]
-    cause = int(np.where(legs == leg, np.abs(every.scores), -1.0).argmax())
+    of_leg = np.flatnonzero(legs == leg)
+    cause = possible_legs(every.scores[of_leg], every.sigmas[of_leg], of_leg)[0]
     parameter = check.robot.mechanism.parameters.parameters[cause]
     return ChangeAlarm(
         records=FIRST_RECORDS,

@@ -87,6 +87,7 @@ class StepAlarm:
         possible_legs: legs of which one changed, the likeliest first; only one where that is certain.
         cause: index of the likeliest cause of the likeliest leg.
         change, sigma: estimate of the step by that cause, in its unit, and its standard deviation.
+        or_causes: other causes of that leg that the runs do not tell from it, each with its change.
         other_legs: legs that changed as well.
     """
 
@@ -97,6 +98,7 @@ class StepAlarm:
     cause: int
     change: float
     sigma: float
+    or_causes: tuple[tuple[int, float], ...]
     other_legs: tuple[int, ...]
 
     @property
@@ -138,10 +140,12 @@ class DriftWatch:
         later = self._periods[change + 2 :]
         end = max(later[0][0], place + 1) if later else len(self._runs)
         gains, row = step_gains(before, self._runs[begin:end], self._causes.by_state), place - begin
-        legs, cause = self._likeliest(gains, row)
+        legs, (cause, *others_of_leg) = self._likeliest(gains, row)
         run, first, last, others = self._noticed[change]
         size, sigma = float(gains.changes[row, cause]), float(gains.sigmas[row, cause])
-        return StepAlarm(run, first, last, legs, cause, size, sigma, tuple(sorted(others - {*legs})))
+        or_causes = tuple((one, float(gains.changes[row, one])) for one in others_of_leg)
+        moved = tuple(sorted(others - {*legs}))
+        return StepAlarm(run, first, last, legs, cause, size, sigma, or_causes, moved)
 
     @property
     def alarms(self) -> tuple[StepAlarm, ...]:
@@ -170,11 +174,12 @@ class DriftWatch:
         first, before = self._periods[-1]
         return step_gains(before, self._runs[first:], self._causes.by_state)
 
-    def _likeliest(self, gains: StepGains, place: int) -> tuple[tuple[int, ...], int]:
-        """The possible legs of a step at a place, and the likeliest cause of the likeliest leg."""
-        legs = possible_legs(np.sqrt(gains.gains[place]), gains.sigmas[place], self._causes.legs)
-        of_leg = np.where(self._causes.legs == legs[0], gains.gains[place], -1.0)
-        return legs, int(of_leg.argmax())
+    def _likeliest(self, gains: StepGains, place: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """The possible legs of a step at a place, and the possible causes of the likeliest leg."""
+        scores, sigmas = np.sqrt(gains.gains[place]), gains.sigmas[place]
+        legs = possible_legs(scores, sigmas, self._causes.legs)
+        of_leg = np.flatnonzero(self._causes.legs == legs[0])
+        return legs, possible_legs(scores[of_leg], sigmas[of_leg], of_leg)
 
 
 def watch_runs(runs: Iterable[RunEvidence], causes: Causes) -> tuple[tuple[StepAlarm, ...], Array]:

@@ -99,7 +99,7 @@ def possible_legs(scores: Array, sigmas: Array, legs: NDArray[np.int_]) -> tuple
     Args:
         scores: (m,) of single causes.
         sigmas: (m,) standard deviations of the estimates of each change.
-        legs: (m,) the leg of each cause.
+        legs: (m,) the leg of each cause; of one leg's causes, the number of each.
     """
     with np.errstate(divide="ignore"):
         ratio = (USUAL_CHANGE / sigmas) ** 2

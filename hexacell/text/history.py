@@ -140,11 +140,13 @@ def change_sentence(found: FoundChange) -> str:
     others = " and ".join(str(leg) for leg in found.other_legs)
     size = f"{unit.number(abs(found.change))} +- {unit.length(found.sigma)}"
     rest = f"legs {others} moved as well" if len(found.other_legs) > 1 else f"leg {others} moved as well"
+    beside = ((name, unit_of(by, unit=of).length(by)) for name, by, of in found.or_parameters)
+    also = "".join(f" or {name} by {by}" for name, by in beside)
     last = f"noticed {found.moved_again} more times, last {found.last_noticed:%Y-%m-%d}"
     again = f" It has moved on since; {last}." if found.moved_again else ""
     return (
         f"leg {legs_text(found)} moved {size} (as {found.parameter.name} by "
-        f"{unit.number(found.change, '+')}) "
+        f"{unit.number(found.change, '+')}{also}) "
         f"between {found.after:%Y-%m-%d %H:%M} and {found.before:%Y-%m-%d %H:%M}"
         f"; {rest if others else 'the others did not'}. "
         f"Noticed {found.noticed:%Y-%m-%d}.{again}"

@@ -30,6 +30,7 @@ class FoundChange:
         possible_legs: legs of which one changed, by all runs until the next change, the likeliest first;
             only one where that is certain.
         parameter: the likeliest one of its leg, with its ``change`` and one standard deviation of that.
+        or_parameters: other parameters of that leg that the runs do not tell from it, with change and unit.
         other_legs: legs that changed as well.
         moved_again: how often the leg alarmed again, each time within ``MOVING_ON_RUNS`` of the last time.
         last_noticed: when the run ended that alarmed last.
@@ -42,6 +43,7 @@ class FoundChange:
     parameter: GeometricParameter
     change: float
     sigma: float
+    or_parameters: tuple[tuple[str, float, str], ...]
     other_legs: tuple[int, ...]
     moved_again: int
     last_noticed: datetime
@@ -93,6 +95,10 @@ def drift_history(cell: Cell, index: RunIndex | None = None) -> DriftHistory:
             parameter=parameters.parameters[first.cause],
             change=first.change,
             sigma=first.sigma,
+            or_parameters=tuple(
+                (parameters.names[one], size, parameters.parameters[one].kind.unit.value)
+                for one, size in first.or_causes
+            ),
             other_legs=tuple(sorted(others - set(first.possible_legs))),
             moved_again=len(again),
             last_noticed=ended[(first, *again)[-1].run],

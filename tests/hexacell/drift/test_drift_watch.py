@@ -1,5 +1,7 @@
 """The watch: quiet on an unchanged robot, and what it says of one that changed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -36,6 +38,16 @@ def test_the_watch_goes_on_after_an_alarm() -> None:
     assert (first.leg, first.run) == (2, 31)
     assert (second.leg, second.run, second.first, second.cause) == (1, 61, 61, 0)
     assert second.change == pytest.approx(-20.0, abs=4 * second.sigma)
+
+
+def test_causes_that_the_runs_do_not_tell_apart_are_named_both() -> None:
+    robot, nearly_one = LinearRobot(), np.eye(6)
+    nearly_one[1, :2] = [1.0, 1e-3]
+    runs = list(robot.runs(30))
+    robot.state[0] += 30.0
+    (alarm,) = watch_runs([*runs, *robot.nights(3)], replace(CAUSES, by_state=nearly_one))[0]
+    assert {alarm.cause, *(other for other, _ in alarm.or_causes)} == {0, 1}
+    assert crashed((3, 30.0))[0].or_causes == ()
 
 
 def test_another_leg_that_moved_as_well_is_named() -> None:

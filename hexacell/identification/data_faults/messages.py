@@ -95,12 +95,10 @@ def _gauge_faults(before: CorrectedFit, after: CorrectedFit) -> DataFault:
         without = f" without {before.lost} record{'s' if before.lost > 1 else ''} that no geometry explains"
     if others := len(after.faults) - len(found):
         rest = f" and without records that {others} other fault{'s' if others > 1 else ''} spoilt"
-    if not after.is_consistent:
-        rest += "; what is left has another cause"
-    ratio, corrected_ratio = before.fit.goodness.ratio, after.fit.goodness.ratio
+    rest += "" if after.is_consistent else "; what is left has another cause"
     sentence = (
-        f"{' and '.join(looks)}: the residuals are {ratio:.3g} times the stated noise{without}, and "
-        f"{corrected_ratio:.3g} times {' and '.join(corrections)}{rest}"
+        f"{' and '.join(looks)}: the residuals are {before.fit.goodness.ratio:.3g} times the stated "
+        f"noise{without}, and {after.fit.goodness.ratio:.3g} times {' and '.join(corrections)}{rest}"
     )
     gauges = "".join(one for one in GAUGES if any(one in fault.gauge_fault.gauges for fault in found))
     return DataFault(found[0].gauge_fault.kind, sentence, ". ".join(actions), gauges=gauges)

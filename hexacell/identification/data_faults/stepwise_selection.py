@@ -15,9 +15,8 @@ instead of log n. Starting with no fault at all (:func:`select_faults`):
    separate the worlds of ``tests/benchmarks/worlds``: the largest statistic of an imperfect machine is 4.1
    critical values, and that of a reading off by 0.5 mm in a good one at least 4.8.
 
-Gross errors, and all records after a shift of a gauge's zero, are left out. Gauge faults are refused, if
-with all that was corrected the residuals can be trusted, and no fit of the records as they are explains
-them (:func:`_other_minimum`).
+Gross errors, and all records after a shift of a gauge's zero, are left out. Gauge faults are refused if
+all that was found explains the records, and no fit explains them as they are (:func:`_other_minimum`).
 
 First-order tests around a wrong solution are unreliable. The drawing is a better expansion point: it is
 within millimetres of the truth, whatever the gauges read. What is tried by refits, in this order
@@ -143,8 +142,7 @@ def select_faults(problem: Problem, fit: Identification | None = None) -> Select
 def _forward(current: CorrectedFit) -> CorrectedFit:
     """Correct for the most likely hypothesis until nothing is significant, or too many were rejected.
 
-    What cannot be corrected is no cause unless all that was found explains the records; else the fit is of
-    the records as they were.
+    One that leaving records out cannot correct is no cause unless all that was found explains the records.
     """
     start, refused = current, None
     while len(current.rejected) < LARGEST_REJECTED_SHARE * current.original.records:

@@ -160,49 +160,31 @@ def test_a_correction_that_loses_most_records_is_not_better(noisy, make_problem)
     assert not few.is_better_by_far_than(current)
 
 
-@pytest.fixture
-def search_finds(monkeypatch):
-    """Has the search find faults one after another: inches first, then another, each with its fit."""
-    also_reversed = replace(ALL_IN_INCHES, gauge_fault=GAUGE_FAULTS[5])
-
-    def found(*fits):
-        def searched(current):
-            number = len(current.faults)
-            faults = (ALL_IN_INCHES, also_reversed)[: number + 1]
-            return replace(fits[number], faults=faults) if number < len(fits) else None
-
-        monkeypatch.setattr(proof, "_searched", searched)
-        monkeypatch.setattr(proof, "restarts", lambda _: iter(()))
-
-    return found
-
-
-def test_a_gauge_fault_that_leaves_far_more_than_the_noise_is_no_cause(noisy, make_problem, search_finds):
-    problem = make_problem(with_encoders(noisy, waves(5, 1.0)))
-    search_finds(CorrectedFit.uncorrected(problem))
-    found = select_faults(ALL_IN_INCHES.corrected(problem)).selected
-    assert found.faults == ()
-    assert found.fit.goodness.agreement is ChiSquareVerdict.TOO_LARGE
-
-
-def test_a_gauge_fault_is_named_with_what_else_explains_the_records(noisy, make_problem, search_finds):
-    right, nearly = make_problem(noisy), make_problem(with_encoders(noisy, waves(5, 1.0)))
-    search_finds(CorrectedFit.uncorrected(nearly), CorrectedFit.uncorrected(right))
+@pytest.mark.parametrize(
+    ("left_mm", "cut_short", "named"),
+    [
+        ([1.0], False, None),  # inches alone leave far more than an imperfect machine
+        ([1.0, 0.0], False, "inches at every point and gauge x looks reversed"),
+        ([0.0], True, None),  # a longer fit explains a healthy robot, far from its drawing
+    ],
+)
+def test_gauge_faults_are_named_if_together_they_and_nothing_else_explain_the_records(
+    noisy, make_problem, monkeypatch, left_mm, cut_short, named
+):
+    faults = (ALL_IN_INCHES, replace(ALL_IN_INCHES, gauge_fault=GAUGE_FAULTS[5]))
+    right = [CorrectedFit.uncorrected(make_problem(with_encoders(noisy, waves(5, mm)))) for mm in left_mm]
+    searched = (replace(fit, faults=faults[:number]) for number, fit in enumerate(right, 1))
+    monkeypatch.setattr(proof, "_searched", lambda _: next(searched, None))
+    monkeypatch.setattr(proof, "restarts", lambda _: iter(()))
+    wrong = ALL_IN_INCHES.corrected(right[0].problem)
+    records, far = right[0].problem if cut_short else wrong, fit_regularized(wrong, QUICK)
+    if named is None:
+        found = select_faults(records, far).selected
+        assert (found.faults, found.is_consistent) == ((), cut_short)
+        return
     with pytest.raises(UncorrectableFaultError) as raised:
-        select_faults(ALL_IN_INCHES.corrected(nearly))
-    sentence = messages.refused(raised.value).sentence
-    assert "inches at every point and gauge x looks reversed at every point: " in sentence
-    assert raised.value.after.is_consistent
-
-
-def test_no_gauge_is_blamed_if_a_longer_search_explains_the_records(noisy, make_problem, search_finds):
-    """The quick fit of a healthy robot far from its drawing may be cut short."""
-    problem = make_problem(noisy)
-    search_finds(CorrectedFit.uncorrected(problem))
-    cut_short = fit_regularized(ALL_IN_INCHES.corrected(problem), QUICK)
-    assert cut_short.goodness.ratio > LARGEST_TRUSTED_RATIO
-    found = select_faults(problem, cut_short).selected
-    assert (found.faults, found.is_consistent) == ((), True)
+        select_faults(records, far)
+    assert named in messages.refused(raised.value).sentence
 
 
 def test_a_gauge_fault_needs_equations_that_could_contradict_it(visit, make_problem):

@@ -11,16 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
+from hexacell.campaign import decisions
 from hexacell.campaign.budget import Budget, shared_sizes
-from hexacell.campaign.decisions import (
-    CampaignState,
-    Decision,
-    Finished,
-    FinishPoint,
-    Forecast,
-    MeasurePose,
-    StartPoint,
-)
 from hexacell.campaign.forecast import Forecaster, PlannedInformation, select_sets
 from hexacell.campaign.online_estimate import OnlineEstimate, OnlineEstimator, RecordEstimator
 from hexacell.campaign.pilots import CAUTION, FIRST_PILOT, MOST_PILOTS, MOST_TO_A_LIST, pilots_per_departure
@@ -69,7 +61,7 @@ class Plan:
     earlier: Mapping[str, Array] = field(default_factory=dict)
     most_turned: float = np.pi
 
-    def decide(self, state: CampaignState) -> Decision:
+    def decide(self, state: decisions.CampaignState) -> decisions.Decision:
         """What to do now.
 
         Raises:
@@ -81,7 +73,7 @@ class Plan:
             return self._start(state.point)
         return self._at_point(state, state.point)
 
-    def estimate(self, state: CampaignState) -> OnlineEstimate:
+    def estimate(self, state: decisions.CampaignState) -> OnlineEstimate:
         """The estimate of the robot from the records so far.
 
         Raises:
@@ -89,7 +81,7 @@ class Plan:
         """
         return self._estimator(state.steering)
 
-    def pilot_pose(self, state: CampaignState) -> MeasurePose | None:
+    def pilot_pose(self, state: decisions.CampaignState) -> decisions.MeasurePose | None:
         """Where to read the gauges next, only to steer the choice of poses; None where that is not wanted.
 
         It is wanted at the first point, while the robot leaves the reference to measure its noise, as long
@@ -134,7 +126,7 @@ class Plan:
             most_turned=max(turns, default=np.pi),
         )
 
-    def allows_provisional(self, state: CampaignState) -> bool:
+    def allows_provisional(self, state: decisions.CampaignState) -> bool:
         """Whether the robot is known well enough for the controller to command with the estimate.
 
         A controller whose own geometry is as good, as after a calibration, keeps it.
@@ -149,13 +141,13 @@ class Plan:
         error, change = self.task.error(belief), belief.free - self.robot.free_parameters
         return error is None or error.largest(change) > error.worst(belief.covariance)
 
-    def forecast(self, state: CampaignState) -> Forecast | None:
+    def forecast(self, state: decisions.CampaignState) -> decisions.Forecast | None:
         """The gain of further records; None without task poses."""
         return self.forecaster.forecast(state, self.estimate(state).belief)
 
     def predicted_belief(self) -> RobotBelief:
         """What will be known at the end, if the robot is as drawn."""
-        return self.forecaster.predicted_belief(self.robot.belief(), CampaignState())
+        return self.forecaster.predicted_belief(self.robot.belief(), decisions.CampaignState())
 
     def poses_at(self, point: int) -> tuple[Pose, ...]:
         """The poses of a point that are given beforehand, its reference first."""
@@ -168,7 +160,7 @@ class Plan:
         listed = self.pose_list
         return self.settings.identification.orientations if listed is None else len(listed.at(point))
 
-    def sizes(self, state: CampaignState) -> Mapping[int, int]:
+    def sizes(self, state: decisions.CampaignState) -> Mapping[int, int]:
         """How many records each point gets at most, once some points were found to be out of reach.
 
         What a file lists, a goal needs, or points gain in the same time, is not shared.
@@ -183,7 +175,7 @@ class Plan:
         """Where a point's gauges are zeroed, in the controller's frames."""
         return self.poses_at(point)[0]
 
-    def route(self, state: CampaignState, start: Pose, end: Pose) -> tuple[Pose, ...] | None:
+    def route(self, state: decisions.CampaignState, start: Pose, end: Pose) -> tuple[Pose, ...] | None:
         """Level poses by way of which clear lines lead from one pose to another; None if there are none.
 
         Poses are in the controller's frames. The gauges are not at the ball.
@@ -281,19 +273,19 @@ class Plan:
     def _stopping(self) -> StoppingRules:
         return StoppingRules(self.settings, self.forecaster, self._estimator, self.goal)
 
-    def _between_points(self, state: CampaignState) -> Decision:
+    def _between_points(self, state: decisions.CampaignState) -> decisions.Decision:
         if reason := self._stopping.end_of_campaign(state):
-            return Finished(reason)
+            return decisions.Finished(reason)
         safe = self._safe(state, [point for point in self.points if point not in state.done])
         if not safe:
-            return Finished("none of the remaining points can be reached safely")
+            return decisions.Finished("none of the remaining points can be reached safely")
         worthwhile = self._worthwhile(state, self._reachable(state, safe) or safe)
         if not worthwhile:
             least = self.settings.identification.least_gain_mm
-            return Finished(f"no record would gain {least:g} mm at the task poses")
+            return decisions.Finished(f"no record would gain {least:g} mm at the task poses")
         return self._start(worthwhile[0])
 
-    def _worthwhile(self, state: CampaignState, points: list[int]) -> list[int]:
+    def _worthwhile(self, state: decisions.CampaignState, points: list[int]) -> list[int]:
         """The points that gain enough, the next one first."""
         plan = self.settings.identification
         if not plan.least_gain_mm and not plan.choose_points:
@@ -302,22 +294,22 @@ class Plan:
         worthwhile = [point for point in points if gains_mm[point] >= plan.least_gain_mm]
         return [best] if plan.choose_points and best in worthwhile else worthwhile
 
-    def _at_point(self, state: CampaignState, point: int) -> Decision:
+    def _at_point(self, state: decisions.CampaignState, point: int) -> decisions.Decision:
         if reason := self._stopping.end_of_point(state, point):
-            return FinishPoint(point, reason)
+            return decisions.FinishPoint(point, reason)
         try:
             proposed = self._next_pose(state, point)
         except LimitError as error:
-            return FinishPoint(point, error.problem)
+            return decisions.FinishPoint(point, error.problem)
         reason = self._stopping.little_gain(proposed)
-        return FinishPoint(point, reason) if reason else proposed
+        return decisions.FinishPoint(point, reason) if reason else proposed
 
-    def _next_pose(self, state: CampaignState, point: int) -> MeasurePose:
+    def _next_pose(self, state: decisions.CampaignState, point: int) -> decisions.MeasurePose:
         estimate = self.estimate(state)
         belief = estimate.belief.zeroed_at(state.zero_mm)
         selected, via = self.chooser.choose(belief, estimate.gauge_zero(point), state)
         base, record = self.robot.frames.base.T, selected.record
-        return MeasurePose(
+        return decisions.MeasurePose(
             point=point,
             orientation=state.records_at(point) + 1,
             pose=self.robot.to_command(selected.command),
@@ -329,7 +321,7 @@ class Plan:
             via=via,
         )
 
-    def _out_of_reach(self, state: CampaignState) -> frozenset[int]:
+    def _out_of_reach(self, state: decisions.CampaignState) -> frozenset[int]:
         """Points that are not to be begun as far as is known.
 
         A point that is only too uncertain may be measured later, if there is another one to learn from.
@@ -343,7 +335,9 @@ class Plan:
             last[:] = [(progress, frozenset(unsafe) - frozenset(possible))]
         return last[0][1]
 
-    def _safe(self, state: CampaignState, points: list[int], *, certainly: bool = True) -> list[int]:
+    def _safe(
+        self, state: decisions.CampaignState, points: list[int], *, certainly: bool = True
+    ) -> list[int]:
         """The points whose reference the robot, as it is known by now, takes within the limits.
 
         With ``certainly`` false, only as the estimate has it.
@@ -358,7 +352,7 @@ class Plan:
         stands = stands_within_limits(belief, references, certainly=certainly)
         return [point for point, is_safe in zip(points, stands, strict=True) if is_safe]
 
-    def _reachable(self, state: CampaignState, points: list[int]) -> list[int]:
+    def _reachable(self, state: decisions.CampaignState, points: list[int]) -> list[int]:
         """The points to which clear lines lead from the present pose; all where that is unknown.
 
         While little is known of the robot, some lines may be too near a limit that are clear later.
@@ -372,7 +366,7 @@ class Plan:
             return points  # the identification reports what is wrong with the records
         return [point for point, route in routes.items() if route is not None]
 
-    def _start(self, point: int) -> StartPoint:
+    def _start(self, point: int) -> decisions.StartPoint:
         robot, pose = self.robot, self.reference_pose(point)
         joints = robot.mechanism.inverse(robot.controller, robot.branch, PoseBatch.of([pose]))
-        return StartPoint(point, pose, joints_of(joints[0]))
+        return decisions.StartPoint(point, pose, joints_of(joints[0]))

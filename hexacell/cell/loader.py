@@ -20,15 +20,8 @@ from hexacell.cell.model import CellSettings
 from hexacell.cell.robot import DEFAULT_MECHANISM
 from hexacell.errors import FileError, HexacellError, UsageError, did_you_mean, joined
 from hexacell.plugins import Group, load, names
+from hexacell.storage import toml_document
 from hexacell.storage.atomic_files import read_text
-from hexacell.storage.toml_document import (
-    MASK,
-    KeyPath,
-    TomlDocument,
-    is_secret,
-    table_header,
-    without_secrets,
-)
 
 _log = logging.getLogger(__name__)
 
@@ -40,7 +33,7 @@ MOST_REPORTED = 20
 
 SectionType = TypeVar("SectionType", bound=Section)
 
-Remark = Callable[[KeyPath], str | None]
+Remark = Callable[[toml_document.KeyPath], str | None]
 """The comment behind the value at a path, if any."""
 
 
@@ -50,7 +43,7 @@ class Cell:
 
     path: Path
     settings: CellSettings
-    document: TomlDocument
+    document: toml_document.TomlDocument
 
     @property
     def text(self) -> str:
@@ -60,7 +53,7 @@ class Cell:
     @property
     def text_without_secrets(self) -> str:
         """The whole file with every password masked, as it is kept with a run."""
-        return without_secrets(self.text)
+        return toml_document.without_secrets(self.text)
 
     @property
     def config_path(self) -> Path:
@@ -105,7 +98,7 @@ def load_cell(path: Path) -> Cell:
 
 def checked_cell(path: Path, text: str) -> Cell:
     """The cell of a file's text, whether the file holds it yet or not; raises as ``load_cell`` does."""
-    document = TomlDocument.parse(text, path)
+    document = toml_document.TomlDocument.parse(text, path)
     robot = document.data.get("robot")  # decides about keys of other sections too
     scales = isinstance(robot, dict) and robot.get("encoder_scales") is True
     settings = validated(document, cell_model(_mechanism(document), encoder_scales=scales), path)
@@ -119,7 +112,7 @@ def is_cell_file(path: Path) -> bool:
     What cannot be read as TOML counts as one, so that nobody overlooks a broken cell file.
     """
     try:
-        data = TomlDocument.parse(read_text(path, LARGEST_FILE_BYTES), path).data
+        data = toml_document.TomlDocument.parse(read_text(path, LARGEST_FILE_BYTES), path).data
     except FileError:
         return True
     return any(section in data for section in ("robot", "gauges", "encoders", "identification"))
@@ -143,7 +136,7 @@ def require_plugins(cell: Cell) -> None:
         raise joined(f"{cell.path} has {len(failures)} mistakes", failures)
 
 
-def _plugins(settings: CellSettings) -> Iterator[tuple[KeyPath, Group, str]]:
+def _plugins(settings: CellSettings) -> Iterator[tuple[toml_document.KeyPath, Group, str]]:
     for n, gauge in enumerate(settings.gauges):
         yield ("gauges", n, "protocol"), Group.GAUGES, gauge.protocol
     for n, thermometer in enumerate(settings.thermometers):
@@ -179,7 +172,7 @@ def schema() -> dict[str, Any]:
     return cell_model(DEFAULT_MECHANISM, encoder_scales=False).model_json_schema()
 
 
-def validated(document: TomlDocument, model: type[SectionType], path: Path) -> SectionType:
+def validated(document: toml_document.TomlDocument, model: type[SectionType], path: Path) -> SectionType:
     """The values of a document by the model of its file.
 
     Raises:
@@ -203,7 +196,7 @@ def validated(document: TomlDocument, model: type[SectionType], path: Path) -> S
     return settings
 
 
-def _mechanism(document: TomlDocument) -> str:
+def _mechanism(document: toml_document.TomlDocument) -> str:
     """The mechanism that the file names, which decides about its other keys.
 
     Raises:
@@ -226,7 +219,7 @@ def dump(settings: Section, remark: Remark = lambda _: None) -> str:
     return "\n".join(_section(settings, (), remark)).lstrip("\n") + "\n"
 
 
-def subsections(path: KeyPath, value: object) -> list[tuple[KeyPath, Section]]:
+def subsections(path: toml_document.KeyPath, value: object) -> list[tuple[toml_document.KeyPath, Section]]:
     """The sections in the value at ``path``, each with its path; empty for a plain value."""
     if isinstance(value, Section):
         return [(path, value)]
@@ -234,7 +227,7 @@ def subsections(path: KeyPath, value: object) -> list[tuple[KeyPath, Section]]:
     return [((*path, n), item) for n, item in enumerate(items) if isinstance(item, Section)]
 
 
-def _section(section: Section, path: KeyPath, remark: Remark) -> Iterator[str]:
+def _section(section: Section, path: toml_document.KeyPath, remark: Remark) -> Iterator[str]:
     """The section's own values first: after a header every key belongs to the section it opens."""
     for name, value in section:
         if not subsections((*path, name), value):
@@ -242,7 +235,7 @@ def _section(section: Section, path: KeyPath, remark: Remark) -> Iterator[str]:
             yield from _setting(key, shown, remark((*path, key)))
     for name, value in section:
         for inner, subsection in subsections((*path, name), value):
-            yield from ("", table_header(inner))
+            yield from ("", toml_document.table_header(inner))
             yield from _section(subsection, inner, remark)
 
 
@@ -281,6 +274,8 @@ def _masked(value: Any) -> Any:  # noqa: ANN401 - what JSON and TOML can hold
     if not isinstance(value, dict):
         return value
     return {
-        key: MASK if is_secret((key,)) and not isinstance(inner, dict | list | None) else _masked(inner)
+        key: toml_document.MASK
+        if toml_document.is_secret((key,)) and not isinstance(inner, dict | list | None)
+        else _masked(inner)
         for key, inner in value.items()
     }

@@ -7,6 +7,7 @@ from typing import Literal, Self, TypeVar
 from pydantic import Field, ValidationError, ValidationInfo, field_validator, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
+from hexacell.cell import measuring
 from hexacell.cell.devices import EncoderSettings, GaugeSettings, ThermometerSettings
 from hexacell.cell.fields import CertificateSettings, Name, Section, broken_rule, key
 from hexacell.cell.limits import (
@@ -15,18 +16,6 @@ from hexacell.cell.limits import (
     LimitSettings,
     MotionSettings,
     SpeedSettings,
-)
-from hexacell.cell.measuring import (
-    AcceptanceSettings,
-    CheckSettings,
-    GuardSettings,
-    IdentificationSettings,
-    NoiseSettings,
-    QuickSettings,
-    StationSettings,
-    TaskSettings,
-    TimingSettings,
-    VerificationSettings,
 )
 from hexacell.cell.operation import (
     MOST_NOTIFICATIONS,
@@ -70,29 +59,29 @@ class CellSettings(Section):
     gauges: tuple[GaugeSettings, GaugeSettings, GaugeSettings]
     encoders: EncoderSettings
     thermometers: tuple[ThermometerSettings, ...] = Field((), max_length=MOST_THERMOMETERS)
-    stations: StationSettings = StationSettings()
+    stations: measuring.StationSettings = measuring.StationSettings()
     tolerances: ToleranceSettings = ToleranceSettings()
-    noise: NoiseSettings = NoiseSettings()
+    noise: measuring.NoiseSettings = measuring.NoiseSettings()
     uncertainty: CommonUncertaintySettings = CommonUncertaintySettings()
     model: ModelSettings = ModelSettings()
     limits: LimitSettings = LimitSettings()
     exclusions: tuple[ExclusionSettings, ...] = Field((), max_length=MOST_EXCLUSIONS)
     motion: MotionSettings = MotionSettings()
     speed: SpeedSettings = SpeedSettings()
-    timing: TimingSettings = TimingSettings()
-    guards: GuardSettings = GuardSettings()
-    identification: IdentificationSettings
-    verification: VerificationSettings
-    acceptance: AcceptanceSettings = AcceptanceSettings()
-    check: CheckSettings = CheckSettings()
-    quick: QuickSettings = QuickSettings()
+    timing: measuring.TimingSettings = measuring.TimingSettings()
+    guards: measuring.GuardSettings = measuring.GuardSettings()
+    identification: measuring.IdentificationSettings
+    verification: measuring.VerificationSettings
+    acceptance: measuring.AcceptanceSettings = measuring.AcceptanceSettings()
+    check: measuring.CheckSettings = measuring.CheckSettings()
+    quick: measuring.QuickSettings = measuring.QuickSettings()
     length_check: LengthCheckSettings | None = None
     recovery: RecoverySettings = RecoverySettings()
     unattended: UnattendedSettings = UnattendedSettings()
     archive: ArchiveSettings = ArchiveSettings()
     notifications: tuple[NotificationSettings, ...] = Field((), max_length=MOST_NOTIFICATIONS)
     opcua: OpcUaSettings | None = None
-    task: TaskSettings = TaskSettings()
+    task: measuring.TaskSettings = measuring.TaskSettings()
     report: ReportSettings = ReportSettings()
     simulation: SimulationSettings | None = None
 

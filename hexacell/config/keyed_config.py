@@ -19,14 +19,7 @@ from typing import Any, Protocol, TypeVar, cast
 from pydantic import Field, ValidationError
 
 from hexacell.cell.fields import Positive, Section, Text, first_mistake
-from hexacell.config.interface import (
-    ConfigPart,
-    NumberToken,
-    number_of,
-    replace_tokens,
-    token_error,
-    write_number,
-)
+from hexacell.config import interface
 from hexacell.errors import UsageError
 from hexacell.kinematics.corrections import CorrectionKind, Corrections
 from hexacell.kinematics.mechanism import Branch
@@ -38,7 +31,7 @@ Options = TypeVar("Options", bound=Section)
 class NumberLookup(Protocol):
     """The numbers of one text by their keys."""
 
-    def number(self, key: str) -> NumberToken:
+    def number(self, key: str) -> interface.NumberToken:
         """The number of a key; raises ``FileError`` if there is none, or more than one."""
 
     def has(self, key: str) -> bool:
@@ -160,13 +153,13 @@ class KeyedConfig:
         self._open = open_text
         self._unit_mm = options.unit_mm
 
-    def read(self, text: str, source: Path | None) -> ConfigPart:
+    def read(self, text: str, source: Path | None) -> interface.ConfigPart:
         """All parameters, or those whose keys are in the text; raises ``FileError`` with the line."""
         lookup, there = self._open(text, source), self._parameters.parameters
         if self._is_part:
             there = tuple(one for one in there if any(map(lookup.has, self._keys_of(one))))
         values = {one.name: self._value(lookup, one, source) for one in there}
-        return ConfigPart(values, self._branch(lookup, source))
+        return interface.ConfigPart(values, self._branch(lookup, source))
 
     def rewrite(
         self, text: str, values: Mapping[str, float], corrections: Corrections | None = None
@@ -177,22 +170,24 @@ class KeyedConfig:
             FileError: the text is no such config, or has no place for the corrections.
         """
         assert corrections is None  # noqa: S101 - such a text has a place for none of them
-        lookup, tokens = self._open(text, None), dict[NumberToken, str]()
+        lookup, tokens = self._open(text, None), dict[interface.NumberToken, str]()
         for one in self._parameters.parameters:
             if one.name not in values:
                 continue
             difference, decimals = values[one.name] - self._value(lookup, one, None), one.kind.unit.decimals
             if abs(difference) > 0.5 * 10.0**-decimals:
                 token, unit = lookup.number(self._keys_of(one)[-1]), self._unit(one)
-                tokens[token] = write_number(number_of(token, None) * unit + difference, decimals, unit)
-        return replace_tokens(text, tokens)
+                tokens[token] = interface.write_number(
+                    interface.number_of(token, None) * unit + difference, decimals, unit
+                )
+        return interface.replace_tokens(text, tokens)
 
     def _value(self, lookup: NumberLookup, parameter: GeometricParameter, source: Path | None) -> float:
         tokens = [lookup.number(key) for key in self._keys_of(parameter)]
-        value = self._unit(parameter) * sum(number_of(token, source) for token in tokens)
+        value = self._unit(parameter) * sum(interface.number_of(token, source) for token in tokens)
         if parameter.kind.is_positive and value <= 0.0:
             problem = f"{parameter.name} is {value:g}, but must be above zero"
-            raise token_error(tokens[-1], problem, source, "Correct it")
+            raise interface.token_error(tokens[-1], problem, source, "Correct it")
         return value
 
     def _keys_of(self, parameter: GeometricParameter) -> tuple[str, ...]:
@@ -212,6 +207,6 @@ class KeyedConfig:
         if isinstance(key, int):
             return key
         token = lookup.number(key)
-        if (value := number_of(token, source)) not in {1.0, -1.0}:
-            raise token_error(token, f"{key} is {token.text}", source, "It must be 1 or -1")
+        if (value := interface.number_of(token, source)) not in {1.0, -1.0}:
+            raise interface.token_error(token, f"{key} is {token.text}", source, "It must be 1 or -1")
         return int(value)

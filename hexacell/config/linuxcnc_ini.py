@@ -30,19 +30,7 @@ from typing import Any, cast
 from pydantic import Field
 
 from hexacell.cell.fields import LARGEST_NUMBER, Text
-from hexacell.config.interface import (
-    LARGEST_BACKLASH,
-    LARGEST_CONFIG_BYTES,
-    NUMBER,
-    ConfigPart,
-    ControllerLimits,
-    NumberToken,
-    Range,
-    number_of,
-    replace_tokens,
-    token_error,
-    write_number,
-)
+from hexacell.config import interface
 from hexacell.config.keyed_config import KeyedOptions, options_of
 from hexacell.config.linuxcnc_legs import LegCorrections
 from hexacell.errors import FileError
@@ -74,7 +62,7 @@ class LinuxcncIni(LegCorrections):
             is_part=is_part,
         )
 
-    def read(self, text: str, source: Path | None) -> ConfigPart:
+    def read(self, text: str, source: Path | None) -> interface.ConfigPart:
         """As those of legs, with backlash and limits; raises ``FileError`` with the line."""
         part, ini = super().read(text, source), IniText(text, source, "")
         backlash = cast("Six", tuple(_backlash(ini, joint, self._unit_mm) for joint in JOINTS))
@@ -129,7 +117,7 @@ class _Variable:
 
     section: str
     name: str
-    token: NumberToken
+    token: interface.NumberToken
     hidden: tuple[str, str] | None
 
 
@@ -141,7 +129,7 @@ class IniText:
     source: Path | None
     section: str
 
-    def number(self, key: str) -> NumberToken:
+    def number(self, key: str) -> interface.NumberToken:
         """The value of ``VARIABLE``, or of ``SECTION/VARIABLE``.
 
         Raises:
@@ -155,10 +143,10 @@ class IniText:
             raise self._missing(section, name, found)
         if len(seen) > 1:
             problem = f"[{section}] has {name} a second time; LinuxCNC takes the one of line {seen[0].line}"
-            raise token_error(seen[1], problem, self.source, "Remove one")
+            raise interface.token_error(seen[1], problem, self.source, "Remove one")
         if more := _NUMBER_AND_MORE.fullmatch(seen[0].text):
             problem = f"behind {name} stands {more['more']!r}, which LinuxCNC takes for a part of the value"
-            raise token_error(seen[0], problem, self.source, "Put it into a line of its own")
+            raise interface.token_error(seen[0], problem, self.source, "Put it into a line of its own")
         return seen[0]
 
     def has(self, key: str) -> bool:
@@ -192,7 +180,7 @@ class IniText:
     def _missing(self, section: str, name: str, found: list[_Variable]) -> FileError:
         for token, (why, action) in ((one.token, one.hidden) for one in found if one.hidden):
             problem = f"LinuxCNC does not see [{section}] {name}: {why}"
-            return token_error(token, problem, self.source, action)
+            return interface.token_error(token, problem, self.source, action)
         return FileError(
             f"there is no {name} in a section [{section}]",
             subject=self.source,
@@ -212,7 +200,7 @@ class IniText:
             if variable := _VARIABLE.fullmatch(content):
                 group = "value" if variable["value"] is not None else "name"
                 first, end = (start + place for place in variable.span(group))
-                token = NumberToken(variable[group], first, end, line)
+                token = interface.NumberToken(variable[group], first, end, line)
                 hidden = _CONTINUATION if was_continued else hidden_by_header
                 yield _Variable(section, variable["name"], token, hidden)
             elif header := _SECTION.match(content):
@@ -242,10 +230,10 @@ def _backlash(ini: IniText, joint: str, unit_mm: float) -> float:
     if not ini.has(key):
         return 0.0
     token = ini.number(key)
-    value = number_of(token, ini.source) * (1.0 if _turns(ini, joint) else unit_mm)
-    if abs(value) > LARGEST_BACKLASH:
+    value = interface.number_of(token, ini.source) * (1.0 if _turns(ini, joint) else unit_mm)
+    if abs(value) > interface.LARGEST_BACKLASH:
         problem = f"{BACKLASH} of [{joint}] is {token.text}, more than a machine can have"
-        raise token_error(token, problem, ini.source, "Correct it")
+        raise interface.token_error(token, problem, ini.source, "Correct it")
     return 0.0 if ini.has(f"{joint}/{COMP_FILE}") else value
 
 
@@ -253,18 +241,18 @@ def _with_backlash(ini: IniText, joint: str, unit_mm: float, wanted: float) -> s
     """The text with another backlash of a joint, if it is another by half of its last decimal."""
     if abs(wanted - _backlash(ini, joint, unit_mm)) <= 0.5 * 10.0**-BACKLASH_DECIMALS:
         return ini.text
-    number = write_number(wanted, BACKLASH_DECIMALS, 1.0 if _turns(ini, joint) else unit_mm)
+    number = interface.write_number(wanted, BACKLASH_DECIMALS, 1.0 if _turns(ini, joint) else unit_mm)
     if ini.has(f"{joint}/{BACKLASH}"):
-        return replace_tokens(ini.text, {ini.number(f"{joint}/{BACKLASH}"): number})
+        return interface.replace_tokens(ini.text, {ini.number(f"{joint}/{BACKLASH}"): number})
     return ini.with_variable(joint, f"{BACKLASH} = {number}")
 
 
 ROTARY_JOINT = "ANGULAR"
 LIMITS = {"MIN_LIMIT": -1.0, "MAX_LIMIT": 1.0}
-UNLIMITED: Range = (-LARGEST_NUMBER, LARGEST_NUMBER)
+UNLIMITED: interface.Range = (-LARGEST_NUMBER, LARGEST_NUMBER)
 
 
-def limits_of_ini(path: Path, unit_mm: float = 1.0) -> ControllerLimits:
+def limits_of_ini(path: Path, unit_mm: float = 1.0) -> interface.ControllerLimits:
     """The limits in an INI file and in those that it includes, in mm and deg; None where none is stated.
 
     ``unit_mm`` is one unit of length of the machine; angles are in degrees on every machine.
@@ -272,19 +260,19 @@ def limits_of_ini(path: Path, unit_mm: float = 1.0) -> ControllerLimits:
     Raises:
         FileError: the file cannot be read, or a limit is no number, or not above the other.
     """
-    text = atomic_files.read_text(path, LARGEST_CONFIG_BYTES)
+    text = atomic_files.read_text(path, interface.LARGEST_CONFIG_BYTES)
     found = limits_in(IniText(text, path, ""), unit_mm)
     for more in filter(Path.is_file, (path.parent / name for name in _INCLUDE.findall(text))):
-        included = IniText(atomic_files.read_text(more, LARGEST_CONFIG_BYTES), more, "")
+        included = IniText(atomic_files.read_text(more, interface.LARGEST_CONFIG_BYTES), more, "")
         found = found.narrowed(limits_in(included, unit_mm))
     return found
 
 
-def limits_in(ini: IniText, unit_mm: float) -> ControllerLimits:
+def limits_in(ini: IniText, unit_mm: float) -> interface.ControllerLimits:
     """The limits in a text; an absent one LinuxCNC takes for none."""
     joints = [_range(ini, section, 1.0 if _turns(ini, section) else unit_mm) for section in JOINTS]
     axes = [_range(ini, f"AXIS_{axis}", unit_mm if axis in "XYZ" else 1.0) for axis in "XYZABC"]
-    return ControllerLimits(
+    return interface.ControllerLimits(
         joints=tuple(one or UNLIMITED for one in joints) if any(joints) else None,
         axes=tuple(axes) if any(axes) else None,
     )
@@ -296,7 +284,7 @@ def _turns(ini: IniText, joint: str) -> bool:
     return ini.has(key) and ini.number(key).text.upper() == ROTARY_JOINT
 
 
-def _range(ini: IniText, section: str, unit: float) -> Range | None:
+def _range(ini: IniText, section: str, unit: float) -> interface.Range | None:
     """Both limits of a joint or an axis; None if it has none."""
     low, high = (_limit(ini, f"{section}/{name}", sign) for name, sign in LIMITS.items())
     if low is None and high is None:
@@ -305,16 +293,16 @@ def _range(ini: IniText, section: str, unit: float) -> Range | None:
     highest = UNLIMITED[1] if high is None else min(UNLIMITED[1], unit * high.value)
     if low is not None and high is not None and lowest >= highest:
         problem = f"MAX_LIMIT of [{section}] is not above its MIN_LIMIT, {low.text}"
-        raise token_error(high, problem, ini.source, "Correct one of them")
+        raise interface.token_error(high, problem, ini.source, "Correct one of them")
     return lowest, highest
 
 
-def _limit(ini: IniText, key: str, sign: float) -> NumberToken | None:
+def _limit(ini: IniText, key: str, sign: float) -> interface.NumberToken | None:
     if not ini.has(key):
         return None
     token = ini.number(key)
     # LinuxCNC's own defaults are -1e99 and 1e99 (emccfg.h).
-    if re.fullmatch(NUMBER, token.text, re.ASCII) and sign * float(token.text) >= LARGEST_NUMBER:
+    if re.fullmatch(interface.NUMBER, token.text, re.ASCII) and sign * float(token.text) >= LARGEST_NUMBER:
         return None
-    number_of(token, ini.source)
+    interface.number_of(token, ini.source)
     return token

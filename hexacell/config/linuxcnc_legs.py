@@ -19,16 +19,7 @@ from pathlib import Path
 from typing import cast
 
 from hexacell.cell.fields import LARGEST_NUMBER
-from hexacell.config.interface import (
-    LARGEST_COMPLIANCE_UM_N,
-    LARGEST_PLAY_MM,
-    ConfigPart,
-    NumberToken,
-    number_of,
-    replace_tokens,
-    token_error,
-    write_number,
-)
+from hexacell.config import interface
 from hexacell.config.keyed_config import KeyedConfig, NumberLookup
 from hexacell.kinematics.corrections import CorrectionKind, Corrections, Six, Three
 from hexacell.kinematics.parameters import LEGS
@@ -48,8 +39,8 @@ class _Number:
 
 def _numbers(unit_mm: float) -> Iterator[tuple[str, _Number]]:
     """The pins of the component, in the order of :meth:`LegCorrections._values`."""
-    play = _Number(-LARGEST_PLAY_MM, LARGEST_PLAY_MM, unit_mm)
-    compliance = _Number(0.0, LARGEST_COMPLIANCE_UM_N, unit_mm / UM)
+    play = _Number(-interface.LARGEST_PLAY_MM, interface.LARGEST_PLAY_MM, unit_mm)
+    compliance = _Number(0.0, interface.LARGEST_COMPLIANCE_UM_N, unit_mm / UM)
     yield from ((f"play.{leg}", play) for leg in range(LEGS))
     yield from ((f"compliance.{leg}", compliance) for leg in range(LEGS))
     yield "weight", _Number(0.0)
@@ -63,7 +54,7 @@ class LegCorrections(KeyedConfig):
 
     holds = frozenset({CorrectionKind.PLAY, CorrectionKind.COMPLIANCE})
 
-    def read(self, text: str, source: Path | None) -> ConfigPart:
+    def read(self, text: str, source: Path | None) -> interface.ConfigPart:
         """As any keyed config, with play and compliance if the text has a place for them.
 
         Raises:
@@ -76,7 +67,7 @@ class LegCorrections(KeyedConfig):
         legs, (weight, *direction, in_middle), centre = values[:12], values[12:17], values[17:]
         if not (length := hypot(*direction)):
             token = lookup.number(self._directions[0])
-            raise token_error(token, "the weight has no direction", source, "State it")
+            raise interface.token_error(token, "the weight has no direction", source, "State it")
         found = Corrections(
             play_mm=cast("Six", tuple(legs[:LEGS])),
             compliance_um_n=cast("Six", tuple(legs[LEGS:])),
@@ -103,11 +94,11 @@ class LegCorrections(KeyedConfig):
         if changed & {*self._directions}:
             # A direction that is no unit vector in the text would change its meaning number by number.
             changed |= {*self._directions}
-        lookup, tokens = self._open(new, None), dict[NumberToken, str]()
+        lookup, tokens = self._open(new, None), dict[interface.NumberToken, str]()
         for key in changed:
             form = self._pins[key]
-            tokens[lookup.number(key)] = write_number(wanted[key], form.decimals, form.unit)
-        return replace_tokens(new, tokens)
+            tokens[lookup.number(key)] = interface.write_number(wanted[key], form.decimals, form.unit)
+        return interface.replace_tokens(new, tokens)
 
     def _key_of_pin(self, pin: str) -> str:
         """The key of a pin of the component, by its name without that of the component."""
@@ -123,10 +114,12 @@ class LegCorrections(KeyedConfig):
 
     def _number(self, lookup: NumberLookup, key: str, source: Path | None) -> float:
         token, number = lookup.number(key), self._pins[key]
-        value = number.unit * number_of(token, source)
+        value = number.unit * interface.number_of(token, source)
         if not number.lowest <= value <= number.highest:
             limits = f"{number.lowest / number.unit:g} to {number.highest / number.unit:g}"
-            raise token_error(token, f"{key} is {token.text}", source, f"It must be from {limits}")
+            raise interface.token_error(
+                token, f"{key} is {token.text}", source, f"It must be from {limits}"
+            )
         return value
 
     def _values(self, corrections: Corrections) -> Mapping[str, float]:

@@ -5,16 +5,8 @@ from statistics import median
 
 import numpy as np
 
+from hexacell.campaign import decisions
 from hexacell.campaign.budget import TimeModel, noise_minutes
-from hexacell.campaign.decisions import (
-    CampaignState,
-    Decision,
-    Finished,
-    FinishPoint,
-    Forecast,
-    MeasurePose,
-    StartPoint,
-)
 from hexacell.campaign.planner import Plan
 from hexacell.checks.quick_level import QuickAccuracy, QuickLevel
 from hexacell.dry_run.verdict_forecast import VerdictForecast, predicted_verdicts
@@ -46,7 +38,7 @@ class VirtualCampaign:
 
     plan: Plan
     virtual_robot: VirtualRobot
-    state: CampaignState = field(default_factory=CampaignState)
+    state: decisions.CampaignState = field(default_factory=decisions.CampaignState)
     outside: int = 0
     reason: str = ""
 
@@ -61,10 +53,10 @@ class VirtualCampaign:
         Raises:
             HexacellError: a decision cannot be made or carried out.
         """
-        while not isinstance(self.step(), Finished):
+        while not isinstance(self.step(), decisions.Finished):
             pass
 
-    def step(self) -> Decision:
+    def step(self) -> decisions.Decision:
         """Make one decision and carry it out.
 
         Raises:
@@ -72,7 +64,7 @@ class VirtualCampaign:
         """
         decision = self.plan.decide(self.state)
         match decision:
-            case StartPoint():
+            case decisions.StartPoint():
                 self._go_to_point(decision)
                 self.virtual_robot.zero_gauges()
                 self._measure(decision)
@@ -81,12 +73,12 @@ class VirtualCampaign:
                 while reference is not None and self._depart():
                     self._return_to(reference)
                     self.state = replace(self.state, present=reference)
-            case MeasurePose():
+            case decisions.MeasurePose():
                 self._go_to_pose(decision)
                 self._measure(decision)
-            case FinishPoint(point=point):
+            case decisions.FinishPoint(point=point):
                 self._finish(point, self.plan.reference_pose(point))
-            case Finished(reason=reason):
+            case decisions.Finished(reason=reason):
                 self.reason = reason
         return decision
 
@@ -102,10 +94,10 @@ class VirtualCampaign:
                 self.state = replace(self.state, pilots=(*self.state.pilots, record))
         return True
 
-    def _go_to_point(self, start: StartPoint) -> None:
+    def _go_to_point(self, start: decisions.StartPoint) -> None:
         self.virtual_robot.place(start.pose)
 
-    def _go_to_pose(self, measure: MeasurePose) -> None:
+    def _go_to_pose(self, measure: decisions.MeasurePose) -> None:
         """Go there at once, or on the planned way where a singularity lies between the two geometries."""
         try:
             self.virtual_robot.place(measure.pose)
@@ -116,13 +108,13 @@ class VirtualCampaign:
     def _return_to(self, reference: Pose) -> None:
         """Go back to the reference of the present point."""
 
-    def _measure(self, decision: StartPoint | MeasurePose) -> None:
+    def _measure(self, decision: decisions.StartPoint | decisions.MeasurePose) -> None:
         record = self._take(decision)
         if record is not None:
             measurements = MeasurementSet((*self.measurements.records, record))
             self.state = replace(self.state, measurements=measurements, point=decision.point)
 
-    def _take(self, decision: StartPoint | MeasurePose) -> Record | None:
+    def _take(self, decision: decisions.StartPoint | decisions.MeasurePose) -> Record | None:
         """The record at the pose of a decision; None where the ball left the gauges' travel."""
         record = self.virtual_robot.measure(decision.point, decision.orientation)
         self.state = replace(self.state, present=decision.pose)
@@ -140,7 +132,7 @@ class VirtualCampaign:
             return
         done = self.state.done | {point}
         measured, pilots = self.state.measurements, self.state.pilots
-        self.state = CampaignState(measured, done=done, present=reference, pilots=pilots)
+        self.state = decisions.CampaignState(measured, done=done, present=reference, pilots=pilots)
         plan = self.plan
         is_wanted = plan.settings.identification.provisional and not plan.robot.uses_provisional
         if is_wanted and plan.allows_provisional(self.state):
@@ -195,7 +187,7 @@ class _Outcome:
     """The campaign on one robot, and the error that remains."""
 
     campaign: VirtualCampaign
-    forecast: Forecast | None
+    forecast: decisions.Forecast | None
     budget: UncertaintyBudget | None
     verdicts: VerdictForecast | None
 

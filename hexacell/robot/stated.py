@@ -33,25 +33,7 @@ from hexacell.limits.gauge_travel import GaugeTravel
 from hexacell.limits.leg_limits import LegLimits
 from hexacell.limits.limits import AxisLimits, Limits, ZeroedRanges
 from hexacell.measurements.records import MEASURED_PARTS
-from hexacell.uncertainty.effect_kinds import (
-    ball_beside_tool,
-    ball_roundness,
-    command_repeatability,
-    common_encoder_scale,
-    common_sag,
-    encoder_eccentricities,
-    encoder_scales,
-    expansion_coefficients,
-    gauge_scales,
-    load_at_work,
-    own_weight,
-    rail_directions,
-    rail_waves,
-    stop_repeatability,
-    temperature_at_work,
-    temperature_while_measuring,
-    thermometers_of_legs,
-)
+from hexacell.uncertainty import effect_kinds
 from hexacell.uncertainty.effects import Effect
 
 NO_CONE_DEG = 180.0
@@ -189,24 +171,30 @@ def stated_effects(
 
     effects: list[Effect] = []
     if isinstance(stated, LinearUncertaintySettings):
-        effects.append(of("common_encoder_scale_um_m", common_encoder_scale))
+        effects.append(of("common_encoder_scale_um_m", effect_kinds.common_encoder_scale))
         # Where the scales are identified, what is not known of them is in the covariance of the parameters.
         if not settings.robot.encoder_scales:
-            effects.append(of("encoder_scale_um_m", encoder_scales))
+            effects.append(of("encoder_scale_um_m", effect_kinds.encoder_scales))
     elif isinstance(stated, RotaryUncertaintySettings):
-        effects.append(of("encoder_eccentricity_mdeg", encoder_eccentricities))
+        effects.append(of("encoder_eccentricity_mdeg", effect_kinds.encoder_eccentricities))
     joint, unit, acts = words.joint, words.joint_unit, stated.stop_repeatability_acts
-    stops = partial(stop_repeatability, is_in_noise=acts == "at work", joint=joint, unit=unit)
-    beside = command_repeatability(1e3 * settings.noise.stops, joint=joint, unit=unit)
+    stops = partial(effect_kinds.stop_repeatability, is_in_noise=acts == "at work", joint=joint, unit=unit)
+    beside = effect_kinds.command_repeatability(1e3 * settings.noise.stops, joint=joint, unit=unit)
     effects.append(of(repeatability_key(unit), stops))
     effects.append(replace(beside, source=stated.sources.get(STOPS, "cell file")))
     if isinstance(stated, UncertaintySettings):
         half_mm = 0.5 * (limits.joint_max - limits.joint_min)
         effects += [
-            of("rail_direction_mrad", rail_directions),
-            of("rail_wave_short_um", partial(rail_waves, wavelength_mm=stated.rail_wave_short_mm)),
-            of("rail_wave_long_um", partial(rail_waves, wavelength_mm=stated.rail_wave_long_mm)),
-            of("rail_sag_um", partial(common_sag, half_length_mm=half_mm)),
+            of("rail_direction_mrad", effect_kinds.rail_directions),
+            of(
+                "rail_wave_short_um",
+                partial(effect_kinds.rail_waves, wavelength_mm=stated.rail_wave_short_mm),
+            ),
+            of(
+                "rail_wave_long_um",
+                partial(effect_kinds.rail_waves, wavelength_mm=stated.rail_wave_long_mm),
+            ),
+            of("rail_sag_um", partial(effect_kinds.common_sag, half_length_mm=half_mm)),
         ]
     expansion = {
         MachinePart.BASE: stated.expansion_base_um_m_k,
@@ -214,29 +202,36 @@ def stated_effects(
         MachinePart.LEGS: stated.expansion_legs_um_m_k,
     }
     acting = {part: 0.0 if part in known else by_kelvin for part, by_kelvin in expansion.items()}
-    measuring = of("temperature_measuring_k", partial(temperature_while_measuring, um_per_m_k=acting))
+    measuring = of(
+        "temperature_measuring_k", partial(effect_kinds.temperature_while_measuring, um_per_m_k=acting)
+    )
     if measured_range_k is not None:
         measuring = replace(measuring, size=measured_range_k, source="thermometers")
     legs: list[Effect] = []
     if MachinePart.LEGS in known:
         of_legs, of_base = expansion[MachinePart.LEGS], expansion[MachinePart.BASE]
-        coefficients = partial(expansion_coefficients, legs_um_m_k=of_legs, base_um_m_k=of_base)
+        coefficients = partial(
+            effect_kinds.expansion_coefficients, legs_um_m_k=of_legs, base_um_m_k=of_base
+        )
         legs = [
-            of("thermometers_k", partial(thermometers_of_legs, um_per_m_k=of_legs)),
+            of("thermometers_k", partial(effect_kinds.thermometers_of_legs, um_per_m_k=of_legs)),
             of("expansion_percent", coefficients),
         ]
-    scales = gauge_scales(1e3 * settings.noise.gauge_scale, is_estimated=True)
+    scales = effect_kinds.gauge_scales(1e3 * settings.noise.gauge_scale, is_estimated=True)
     yields = stated.leg_compliance_um_n
     return (
         *effects,
         replace(scales, source="noise.gauge_scale"),
-        of("ball_roundness_um", ball_roundness),
-        of("ball_beside_tool_mm", ball_beside_tool),
-        of("temperature_at_work_k", partial(temperature_at_work, um_per_m_k=expansion)),
+        of("ball_roundness_um", effect_kinds.ball_roundness),
+        of("ball_beside_tool_mm", effect_kinds.ball_beside_tool),
+        of("temperature_at_work_k", partial(effect_kinds.temperature_at_work, um_per_m_k=expansion)),
         measuring,
         *legs,
-        of("load_n", partial(load_at_work, um_per_n=yields)),
-        of("own_weight_n", partial(own_weight, um_per_n=yields, weight=_stated_weight(settings))),
+        of("load_n", partial(effect_kinds.load_at_work, um_per_n=yields)),
+        of(
+            "own_weight_n",
+            partial(effect_kinds.own_weight, um_per_n=yields, weight=_stated_weight(settings)),
+        ),
     )
 
 

@@ -15,15 +15,7 @@ from textual.widgets import Input
 
 from hexacell.screen.preferences import KEYS, preferences_path, shown_path
 from hexacell.screen.widgets import DevicePanel, TextList, TextPanel
-from hexacell.text.screens.views import (
-    KEYS_NOTE,
-    KEYS_TITLE,
-    REPLAY_HELP,
-    SCREEN_HELP,
-    Choice,
-    FaultView,
-    QuestionView,
-)
+from hexacell.text.screens import views
 
 if TYPE_CHECKING:
     from hexacell.screen.model import ScreenModel
@@ -41,7 +33,7 @@ class AnswerOverlay(ModalScreen[ScreenResultType]):
     ]
     AUTO_FOCUS = "#question-text"
 
-    def __init__(self, view: QuestionView) -> None:
+    def __init__(self, view: views.QuestionView) -> None:
         super().__init__()
         self.view = view
 
@@ -103,14 +95,14 @@ class ConfirmOverlay(AnswerOverlay[str | None]):
         self.dismiss(value)
 
 
-QUITTING = QuestionView(
+QUITTING = views.QuestionView(
     title="A run goes on here",
     paragraphs=("What is to become of it?",),
     instruction="Press a key:",
     choices=(
-        Choice("s", "stop it after its step, and quit; it can be resumed", "stop"),
-        Choice("l", "quit and leave it running; `hexacell tui` comes back to it", "leave"),
-        Choice("escape", "stay here", None),
+        views.Choice("s", "stop it after its step, and quit; it can be resumed", "stop"),
+        views.Choice("l", "quit and leave it running; `hexacell tui` comes back to it", "leave"),
+        views.Choice("escape", "stay here", None),
     ),
 )
 
@@ -124,7 +116,7 @@ class QuestionOverlay(AnswerOverlay[None]):
     ]
 
     def __init__(
-        self, view: QuestionView, number: int, answer: Callable[[str | None], Awaitable[None]]
+        self, view: views.QuestionView, number: int, answer: Callable[[str | None], Awaitable[None]]
     ) -> None:
         super().__init__(view)
         self.number = number
@@ -152,7 +144,7 @@ class FaultOverlay(ModalScreen[None]):
         ("a", "app.perform('abort')", "Abort"),
     ]
 
-    def __init__(self, view: FaultView) -> None:
+    def __init__(self, view: views.FaultView) -> None:
         super().__init__()
         self._view = view
 
@@ -187,7 +179,7 @@ class HelpOverlay(ModalScreen[None]):
     def on_mount(self) -> None:
         """Show the texts."""
         keys = [f"  {self._keys[str(one.id)]:8} {one.description}" for one in KEYS]
-        note = KEYS_NOTE.format(path=shown_path(preferences_path()))
-        about = [*SCREEN_HELP[self._tab].splitlines(), ""]
-        replay = ["", *REPLAY_HELP.splitlines()]
-        self.query_one(TextList).show([*about, f"{KEYS_TITLE}:", *keys, "", note, *replay])
+        note = views.KEYS_NOTE.format(path=shown_path(preferences_path()))
+        about = [*views.SCREEN_HELP[self._tab].splitlines(), ""]
+        replay = ["", *views.REPLAY_HELP.splitlines()]
+        self.query_one(TextList).show([*about, f"{views.KEYS_TITLE}:", *keys, "", note, *replay])

@@ -31,14 +31,7 @@ from hexacell.kinematics.sensitivity import has_singularity_margin, singularity_
 from hexacell.lengths import MM_PER_METRE
 from hexacell.robot.model import Robot, make_robot, robot_of
 from hexacell.robot.same_robot import reordered
-from hexacell.services.other_units import (
-    MOST,
-    asked_of_limits,
-    limit_in_other_unit,
-    size_mm_of,
-    task_in_radians,
-    without_leg_limits,
-)
+from hexacell.services import other_units
 from hexacell.storage.toml_document import KeyPath
 
 StatedPose = tuple[KeyPath, str, Pose]
@@ -87,13 +80,15 @@ def design_facts(cell: Cell) -> Iterator[HexacellError]:
     pose_list = pose_list_of(cell)
     stated = stated_poses(cell.settings, has_list=pose_list is not None)
     commands = PoseBatch.of(pose for _, _, pose in stated)
-    if (turned := task_in_radians(cell)) is not None:
+    if (turned := other_units.task_in_radians(cell)) is not None:
         yield turned
     corrected = cell
-    for asked in asked_of_limits(cell, robot_of(without_leg_limits(cell)), commands):
+    for asked in other_units.asked_of_limits(
+        cell, robot_of(other_units.without_leg_limits(cell)), commands
+    ):
         if asked.is_in_other_unit:
             corrected = asked.corrected_in(corrected)
-            yield limit_in_other_unit(cell, asked)
+            yield other_units.limit_in_other_unit(cell, asked)
     yield from _whole_design(corrected, commands)
 
 
@@ -104,9 +99,9 @@ def _whole_design(cell: Cell, commands: PoseBatch) -> Iterator[FileError]:
     if (in_metres := _points_in_metres(cell, controller, commands)) is not None:
         yield in_metres
         return
-    if stands.mean() > MOST:
+    if stands.mean() > other_units.MOST:
         return
-    robot = robot_of(without_leg_limits(cell))
+    robot = robot_of(other_units.without_leg_limits(cell))
     singular, is_explained = _singular_everywhere(cell, robot, commands)
     if singular is not None and is_explained:
         yield singular
@@ -135,9 +130,9 @@ def _points_in_metres(cell: Cell, controller: ControllerGeometry, commands: Pose
     """That the points are in metres: all are near the origin, and in millimetres the robot takes them."""
     far_mm = float(np.median(np.linalg.norm(commands.positions, axis=-1)))
     in_mm = PoseBatch(MM_PER_METRE * commands.positions, commands.rotations)
-    if not 0.0 < far_mm < POINTS_SHARE * size_mm_of(cell.settings.drawing):
+    if not 0.0 < far_mm < POINTS_SHARE * other_units.size_mm_of(cell.settings.drawing):
         return None
-    if _can_stand(without_leg_limits(cell).settings, controller, in_mm).mean() < NEARLY_ALL:
+    if _can_stand(other_units.without_leg_limits(cell).settings, controller, in_mm).mean() < NEARLY_ALL:
         return None
     return FileError(
         f"the points look like metres: most are {far_mm:.3g} mm from the origin of the base",
@@ -173,7 +168,7 @@ def _others(
         drawn = reordered(settings.drawing, of_platform, order)
         commanding = replace(controller, geometry=reordered(controller.geometry, of_platform, order))
         yield fact, _drawn_as(settings, drawn), commanding
-    if (size_mm := size_mm_of(settings.drawing)) < SMALLEST_MACHINE_MM:
+    if (size_mm := other_units.size_mm_of(settings.drawing)) < SMALLEST_MACHINE_MM:
         problem = f"the drawing looks like metres: {size_mm:g} is its largest length"
         lengths = parameters.by_kind(
             {one.symbol: MM_PER_METRE if one.unit is ParameterUnit.MM else 1.0 for one in parameters.kinds}
@@ -257,10 +252,10 @@ def _similarity(base: Array, platform: Array) -> float:
 
 def _way_into_reach(cell: Cell, robot: Robot, commands: PoseBatch) -> str:
     """What brings all poses into reach: other limits of legs, or the shortest way along an axis."""
-    settings, controller = without_leg_limits(cell).settings, controller_geometry(cell)
+    settings, controller = other_units.without_leg_limits(cell).settings, controller_geometry(cell)
     if _can_stand(settings, controller, commands).mean() >= NEARLY_ALL:
         return "Correct [limits.passive_joints] or leg_distance_mm: without them the robot takes them"
-    step = size_mm_of(robot.drawing) / (SHIFTS / 2)
+    step = other_units.size_mm_of(robot.drawing) / (SHIFTS / 2)
     ways = (number * sign * step for number in range(1, SHIFTS + 1) for sign in (1.0, -1.0))
     for way, axis in product(ways, (2, 1, 0)):
         moved = PoseBatch(commands.positions + way * np.eye(3)[axis], commands.rotations)

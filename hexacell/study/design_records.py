@@ -27,14 +27,7 @@ from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.robot.model import Robot
 from hexacell.robot.virtual_robot import VirtualRobot
-from hexacell.study.data_sets import (
-    DataSet,
-    Reached,
-    data_set,
-    random_orientations,
-    reached,
-    unlimited_travel,
-)
+from hexacell.study import data_sets
 
 RANDOM_DEG = (20.0, 14.0, 10.0, 7.0, 5.0, 3.5, 2.5, 1.8, 1.2, 0.9, 0.6, 0.4)
 """Amplitudes of random angles, the largest first."""
@@ -97,7 +90,7 @@ def chosen_records(
         case OrientationChoice.PAPER:
             amplitude, count = float(np.radians(PAPER_DEG)), settings.identification.orientations
             points = np.array(settings.identification.points)
-            drawn = unlimited_travel(robot, truth, points, count, amplitude, random)
+            drawn = data_sets.unlimited_travel(robot, truth, points, count, amplitude, random)
             return ChosenRecords(robot, drawn.measured(robot.noise.gauge_mm, random))
 
 
@@ -210,7 +203,7 @@ def chosen_orientations(
     accurate_at: tuple[Array, float],
     amplitude: float,
     random: np.random.Generator,
-) -> DataSet:
+) -> data_sets.DataSet:
     """So many orientations within ``amplitude``, rad, at each of some points (m, 3), mm, that we choose.
 
     It is to be accurate at points (k, 3), mm, within angles of so many rad (``accurate_at``).
@@ -239,23 +232,26 @@ def chosen_orientations(
             best = int(gain.argmax())
             rows.append(best)
             covariance = covariance_update(covariance, some.jacobian[best], some.covariance[best])
-    return data_set(
+    return data_sets.data_set(
         robot, [pool[np.array(rows)] for pool, rows in zip(pools, taken, strict=True)], orientations
     )
 
 
 def _pool(
     robot: Robot, truth: Geometry, point: Array, amplitude: float, batches: int, random: np.random.Generator
-) -> Reached:
+) -> data_sets.Reached:
     """What can be reached of some batches of random orientations at a point."""
-    turns = islice(random_orientations(random, amplitude), batches)
+    turns = islice(data_sets.random_orientations(random, amplitude), batches)
     margin = robot.limits.singularity_margin
-    return Reached.joined(
-        [reached(robot, truth, robot.frames.poses(PoseBatch.at(point, each)), margin) for each in turns]
+    return data_sets.Reached.joined(
+        [
+            data_sets.reached(robot, truth, robot.frames.poses(PoseBatch.at(point, each)), margin)
+            for each in turns
+        ]
     )
 
 
-def _records(belief: RobotBelief, pool: Reached) -> PredictedRecords:
+def _records(belief: RobotBelief, pool: data_sets.Reached) -> PredictedRecords:
     """The records of a pool, by the drawing, with the gauges zeroed at its first pose."""
     targets = ReachableTargets(pool.commands, pool.joints)
     first = pool[:1]

@@ -22,17 +22,9 @@ from hexacell.identification.problem.prior import Noise
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import POSITION, pose_sensitivity
+from hexacell.uncertainty import length_records
 from hexacell.uncertainty.effect_kinds import COMMON_SCALE, common_encoder_scale
 from hexacell.uncertainty.effects import Effect
-from hexacell.uncertainty.length_records import (
-    JudgedGeometry,
-    LengthError,
-    LengthRecords,
-    LengthStandard,
-    errors_by_effect,
-    errors_by_gauges,
-    shared_errors,
-)
 from hexacell.uncertainty.propagation import ScaleObservation, each_alone
 from hexacell.uncertainty.statement import COVERAGE_FACTOR, covariance_factor
 
@@ -52,21 +44,21 @@ class LengthCheck:
         by_scale: (n, 3, 1) errors of the places by 1 um/m of the scale common to all encoders.
     """
 
-    records: LengthRecords
-    standard: LengthStandard
+    records: length_records.LengthRecords
+    standard: length_records.LengthStandard
     jacobian: Array
     noise: Array
-    errors: tuple[LengthError, ...]
+    errors: tuple[length_records.LengthError, ...]
     by_effects: Mapping[str, Array]
     by_scale: Array
 
     @classmethod
     def of(
         cls,
-        records: LengthRecords,
-        standard: LengthStandard,
+        records: length_records.LengthRecords,
+        standard: length_records.LengthStandard,
         noise: Noise,
-        judged: JudgedGeometry,
+        judged: length_records.JudgedGeometry,
         effects: Iterable[Effect] = (),
     ) -> "LengthCheck":
         """The check of a geometry.
@@ -84,16 +76,20 @@ class LengthCheck:
         by_all, by_joints = found.parameters, found.joints
         jacobian = by_all @ mechanism.convention.basis
         acting = [one for one in effects if one.occurrence.is_in_records and one.name != COMMON_SCALE]
-        shared = {one.name: shared_errors(records, jacobian, judged, one) for one in acting}
+        shared = {one.name: length_records.shared_errors(records, jacobian, judged, one) for one in acting}
         by_geometry = jacobian @ covariance_factor(judged.covariance)
-        by_effect = (error for one in acting for error in errors_by_effect(records, one, shared[one.name]))
+        by_effect = (
+            error
+            for one in acting
+            for error in length_records.errors_by_effect(records, one, shared[one.name])
+        )
         errors = (
-            LengthError("covariance of the geometry", by_geometry, is_shared=True),
-            *errors_by_gauges(records, standard, noise),
+            length_records.LengthError("covariance of the geometry", by_geometry, is_shared=True),
+            *length_records.errors_by_gauges(records, standard, noise),
             *by_effect,
         )
         scaled = judged.with_scale(mechanism, geometry)
-        by_scale = shared_errors(records, jacobian, scaled, common_encoder_scale(1.0))
+        by_scale = length_records.shared_errors(records, jacobian, scaled, common_encoder_scale(1.0))
         noises = noise.record_covariance(by_joints)
         return cls(records, standard, jacobian, noises, errors, shared, by_scale)
 
@@ -190,7 +186,7 @@ class LengthCheck:
         weights = self._weights
         return float(self._share(np.sqrt(np.einsum("na,nab,nb->", weights, self.noise, weights))))
 
-    def _of(self, error: LengthError) -> float:
+    def _of(self, error: length_records.LengthError) -> float:
         """One standard deviation of the length by a source, um/m."""
         return float(np.linalg.norm(self._share(self._to_length(error.columns))))
 

@@ -20,13 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexacell.distributions import chi_square_limit
-from hexacell.identification.data_faults.hypotheses import (
-    FaultHypothesis,
-    GaugeFaultHypothesis,
-    OutlierHypothesis,
-    ZeroShiftHypothesis,
-    rank_hypotheses,
-)
+from hexacell.identification.data_faults import hypotheses
 from hexacell.identification.data_faults.stepwise_selection import SHOWN_DECREASE
 from hexacell.identification.placement import Weight, leg_forces
 from hexacell.identification.solver.chi_square import ChiSquareTest
@@ -145,10 +139,10 @@ def _lost_place(test: ExcessTest) -> Iterator[PossibleCause]:
 
 def _of_the_records(test: ExcessTest) -> Iterator[PossibleCause]:
     """The most likely data fault of each kind, if it is significant and the records can show it."""
-    kinds: set[type[FaultHypothesis]] = set()
+    kinds: set[type[hypotheses.FaultHypothesis]] = set()
     shown = (1.0 - 1.0 / SHOWN_DECREASE) * test.found.noise_test.chi2
-    for hypothesis in rank_hypotheses(test.found.problem, test.found):
-        if isinstance(hypothesis, GaugeFaultHypothesis) and hypothesis.gain < shown:
+    for hypothesis in hypotheses.rank_hypotheses(test.found.problem, test.found):
+        if isinstance(hypothesis, hypotheses.GaugeFaultHypothesis) and hypothesis.gain < shown:
             continue
         if type(hypothesis) not in kinds:
             kinds.add(type(hypothesis))
@@ -156,13 +150,13 @@ def _of_the_records(test: ExcessTest) -> Iterator[PossibleCause]:
             yield PossibleCause(_name(hypothesis), share)
 
 
-def _name(hypothesis: FaultHypothesis) -> str:
+def _name(hypothesis: hypotheses.FaultHypothesis) -> str:
     match hypothesis:
-        case OutlierHypothesis(records=((point, orientation), *_)):
+        case hypotheses.OutlierHypothesis(records=((point, orientation), *_)):
             return f"a false reading at point {point}, orientation {orientation}"
-        case ZeroShiftHypothesis(point=point, orientation=orientation):
+        case hypotheses.ZeroShiftHypothesis(point=point, orientation=orientation):
             return f"a shift of the gauges' zero at point {point} before orientation {orientation}"
-        case GaugeFaultHypothesis(gauge_fault=fault, point=point):
+        case hypotheses.GaugeFaultHypothesis(gauge_fault=fault, point=point):
             where = "at every point" if point is None else f"at point {point}"
             return f"{fault.kind.value} ({', '.join(fault.gauges)}) {where}"
     raise TypeError(hypothesis)

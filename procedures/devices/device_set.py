@@ -9,17 +9,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Generic, TypeVar
 
-from drivers.interfaces import (
-    Controller,
-    ControllerStatus,
-    DeviceIdentity,
-    EncoderBank,
-    EncoderSample,
-    Gauge,
-    GaugeReading,
-    StopInput,
-    Thermometer,
-)
+from drivers import interfaces
 from drivers.stop_input import CombinedStopInput
 from hexacell.cell.devices import GaugeAxis
 from hexacell.errors import HexacellError, joined
@@ -32,7 +22,7 @@ OTHERS_PERIOD_S = 1.0
 """Encoders and controller may be guarded meanwhile, which reads them more often."""
 
 Result = TypeVar("Result")
-Opened = DeviceIdentity | tuple[DeviceIdentity, ...] | None
+Opened = interfaces.DeviceIdentity | tuple[interfaces.DeviceIdentity, ...] | None
 
 _log = logging.getLogger(__name__)
 
@@ -84,13 +74,13 @@ class LiveValues:
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
         self.now = now
-        self.encoders: LiveValue[EncoderSample] = LiveValue(self)
-        self.controller: LiveValue[ControllerStatus] = LiveValue(self)
+        self.encoders: LiveValue[interfaces.EncoderSample] = LiveValue(self)
+        self.controller: LiveValue[interfaces.ControllerStatus] = LiveValue(self)
         self.stop_reason: LiveValue[str] = LiveValue(self)
-        self._gauges: dict[str, LiveValue[GaugeReading]] = {}
+        self._gauges: dict[str, LiveValue[interfaces.GaugeReading]] = {}
         self._subscribers: set[asyncio.Event] = set()
 
-    def gauge(self, name: str) -> LiveValue[GaugeReading]:
+    def gauge(self, name: str) -> LiveValue[interfaces.GaugeReading]:
         """The reading of a gauge, mm in its own zero and direction."""
         return self._gauges.setdefault(name, LiveValue(self))
 
@@ -117,7 +107,7 @@ class LiveValues:
 class MountedGauge:
     """A gauge and the axis it is mounted on."""
 
-    gauge: Gauge
+    gauge: interfaces.Gauge
     axis: GaugeAxis
 
 
@@ -129,12 +119,12 @@ class Devices:
     """
 
     gauges: tuple[MountedGauge, ...]
-    encoders: EncoderBank
-    controller: Controller
-    stop_input: StopInput = field(default_factory=CombinedStopInput)
+    encoders: interfaces.EncoderBank
+    controller: interfaces.Controller
+    stop_input: interfaces.StopInput = field(default_factory=CombinedStopInput)
     live: LiveValues = field(default_factory=LiveValues)
 
-    async def open(self) -> tuple[DeviceIdentity, ...]:
+    async def open(self) -> tuple[interfaces.DeviceIdentity, ...]:
         """Connect to all at once; nothing moves. Raises ``HexacellError``, which names all that fail."""
         gauges: list[Awaitable[Opened]] = [mounted.gauge.open() for mounted in self.gauges]
         calls = [*gauges, self.encoders.open(), self.controller.open(), self.stop_input.open()]
@@ -142,25 +132,27 @@ class Devices:
         several = (one if isinstance(one, tuple) else (one,) for one in found)
         return tuple(identity for some in several for identity in some if identity is not None)
 
-    async def read_gauges(self, on_answer: Callable[[], object] = lambda: None) -> list[GaugeReading]:
+    async def read_gauges(
+        self, on_answer: Callable[[], object] = lambda: None
+    ) -> list[interfaces.GaugeReading]:
         """One reading of each gauge, in the order of ``gauges``; ``on_answer`` is called at each."""
 
-        async def read(gauge: Gauge) -> GaugeReading:
+        async def read(gauge: interfaces.Gauge) -> interfaces.GaugeReading:
             reading = await self.live.gauge(gauge.name).of(gauge.read)
             on_answer()
             return reading
 
         return await gather_errors("gauges cannot be read", [read(one.gauge) for one in self.gauges])
 
-    async def read_gauge_once(self, gauge: Gauge) -> GaugeReading:
+    async def read_gauge_once(self, gauge: interfaces.Gauge) -> interfaces.GaugeReading:
         """One reading of a gauge, without repetition."""
         return await self.live.gauge(gauge.name).of(gauge.read_once)
 
-    async def read_encoders(self) -> EncoderSample:
+    async def read_encoders(self) -> interfaces.EncoderSample:
         """One sample of the encoders."""
         return await self.live.encoders.of(self.encoders.read)
 
-    async def controller_status(self) -> ControllerStatus:
+    async def controller_status(self) -> interfaces.ControllerStatus:
         """The status of the controller."""
         return await self.live.controller.of(self.controller.status)
 
@@ -174,12 +166,9 @@ class Devices:
 
     async def close(self) -> None:
         """Let all of them go, whatever happens to one."""
-        ports: list[Gauge | EncoderBank | Controller | StopInput] = [
-            *(mounted.gauge for mounted in self.gauges),
-            self.encoders,
-            self.controller,
-            self.stop_input,
-        ]
+        ports: list[
+            interfaces.Gauge | interfaces.EncoderBank | interfaces.Controller | interfaces.StopInput
+        ] = [*(mounted.gauge for mounted in self.gauges), self.encoders, self.controller, self.stop_input]
         await asyncio.gather(*(port.close() for port in ports), return_exceptions=True)
 
 
@@ -198,11 +187,11 @@ async def gather_errors(problem: str, calls: Sequence[Awaitable[Result]]) -> lis
 class Thermometers:
     """The cell's thermometers. One that fails gives a record without number, and one warning."""
 
-    def __init__(self, thermometers: Sequence[Thermometer] = ()) -> None:
+    def __init__(self, thermometers: Sequence[interfaces.Thermometer] = ()) -> None:
         self._thermometers = tuple(thermometers)
         self._failing: set[str] = set()
 
-    async def open(self) -> tuple[DeviceIdentity, ...]:
+    async def open(self) -> tuple[interfaces.DeviceIdentity, ...]:
         """Who answers; the others are warned of and may answer later."""
         found = await asyncio.gather(*(self._identity(one) for one in self._thermometers))
         return tuple(identity for identity in found if identity is not None)
@@ -215,14 +204,14 @@ class Thermometers:
         """Let all of them go."""
         await asyncio.gather(*(one.close() for one in self._thermometers), return_exceptions=True)
 
-    async def _identity(self, thermometer: Thermometer) -> DeviceIdentity | None:
+    async def _identity(self, thermometer: interfaces.Thermometer) -> interfaces.DeviceIdentity | None:
         try:
             return await thermometer.open()
         except Exception as error:  # a third-party driver may raise anything
             self._warn(thermometer.name, error)
             return None
 
-    async def _temperature(self, thermometer: Thermometer) -> Temperature:
+    async def _temperature(self, thermometer: interfaces.Thermometer) -> Temperature:
         try:
             reading = await thermometer.read()
         except Exception as error:

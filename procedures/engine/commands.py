@@ -7,17 +7,9 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
 from hexacell.errors import AnswerNeeded, UsageError
+from procedures.run import questions
 from procedures.run.cancellation import cancel_and_wait
 from procedures.run.keys import Phase, SetKey
-from procedures.run.questions import (
-    GaugePlacement,
-    Operator,
-    PendingChange,
-    Question,
-    StepFailure,
-    UnreadyController,
-    WrittenResult,
-)
 from procedures.run.state import RunState
 from procedures.steps import events
 
@@ -164,11 +156,11 @@ class QuestionBroker:
     question that is opened, and with None when it is closed.
     """
 
-    def __init__(self, operator: Operator) -> None:
+    def __init__(self, operator: questions.Operator) -> None:
         self._operator = operator
         self._answer: asyncio.Future[str | None] | None = None
-        self.open: Question | None = None
-        self.watchers: list[Callable[[Question | None], None]] = []
+        self.open: questions.Question | None = None
+        self.watchers: list[Callable[[questions.Question | None], None]] = []
 
     def answer(self, answer: str | None) -> bool:
         """Answer the open question; False if none is open or this is no answer to it."""
@@ -180,7 +172,7 @@ class QuestionBroker:
         self._answer.set_result(answer)
         return True
 
-    async def ask(self, question: Question) -> str | None:
+    async def ask(self, question: questions.Question) -> str | None:
         """The operator's answer, or one given meanwhile; raises ``AnswerNeeded`` if there is none."""
         asked = asyncio.ensure_future(self._operator.ask(question))
         self._answer = asyncio.get_running_loop().create_future()
@@ -193,7 +185,7 @@ class QuestionBroker:
             self._set_open(None)
             await cancel_and_wait(asked)
 
-    def _set_open(self, question: Question | None) -> None:
+    def _set_open(self, question: questions.Question | None) -> None:
         self.open = question
         for watcher in self.watchers:
             watcher(question)
@@ -202,30 +194,30 @@ class QuestionBroker:
 class UnattendedOperator:
     """No person is present: every question ends the run."""
 
-    async def ask(self, question: Question) -> str | None:
+    async def ask(self, question: questions.Question) -> str | None:
         """Raise ``AnswerNeeded``: what is needed, and how to run without it where that is possible."""
         match question.subject:
-            case GaugePlacement(pose=pose, seat=int(seat)):
+            case questions.GaugePlacement(pose=pose, seat=int(seat)):
                 raise AnswerNeeded(
                     f"the gauges must be mounted in seat {seat} of the fixture ({pose}), but the run is "
                     "unattended",
                     action='Run it attended, or set mounting = "fixed" in [length_check] if no person is '
                     "needed",
                 )
-            case GaugePlacement(station=station, pose=pose):
+            case questions.GaugePlacement(station=station, pose=pose):
                 raise AnswerNeeded(
                     f"the gauges must be put around the ball at {station} ({pose}), but the run is "
                     "unattended",
                     action='Run it attended, or use fixed stations (placement = "fixed" in [stations])',
                 )
-            case PendingChange(gates=gates):
+            case questions.PendingChange(gates=gates):
                 reasons = " ".join(gate.sentence for gate in gates if not gate.passed)
                 raise AnswerNeeded(
                     f"the new geometry waits for approval: {reasons or 'the cell file says to ask'}"
                 )
-            case WrittenResult(line=line):
+            case questions.WrittenResult(line=line):
                 raise AnswerNeeded(f"{line}: a person must decide whether the new geometry stays")
-            case UnreadyController(problem=problem, word=word):
+            case questions.UnreadyController(problem=problem, word=word):
                 raise AnswerNeeded(
                     f"{problem}, and the run is unattended",
                     action="Find out why, release it and reset it at the controller, then begin or resume"
@@ -233,5 +225,5 @@ class UnattendedOperator:
                     else f'Add "{word}" to startup in [controller] if the program may do that by itself, '
                     "do it at the controller, or run it attended",
                 )
-            case StepFailure(problem=problem):
+            case questions.StepFailure(problem=problem):
                 raise AnswerNeeded(f"{problem} A person must choose: {', '.join(question.choices)}")

@@ -9,16 +9,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from drivers import errors as device
+from hexacell import errors
 from hexacell.cell.recovery import Action, Escalations, FailureKind
-from hexacell.errors import (
-    AnswerNeeded,
-    DeviceError,
-    FileError,
-    HexacellError,
-    Interruption,
-    SeveralErrors,
-    WriteBackUndone,
-)
 from procedures.devices.reconnection import reconnect
 from procedures.devices.settling import NeverSettled
 from procedures.engine.command_loop import CommandLoop, StepCancelled
@@ -39,7 +31,7 @@ from procedures.steps.take_back import TakeBack
 from procedures.workflow.next_step import StepExecutor
 from procedures.workflow.sets import NoSafePath, TravelError
 
-KINDS: Mapping[type[HexacellError], FailureKind] = {
+KINDS: Mapping[type[errors.HexacellError], FailureKind] = {
     device.GaugeSilent: FailureKind.GAUGE_SILENT,
     device.WrongAnswer: FailureKind.GAUGE_SILENT,
     device.WrongSetting: FailureKind.GAUGE_SETTING,
@@ -58,8 +50,8 @@ KINDS: Mapping[type[HexacellError], FailureKind] = {
     MountingError: FailureKind.MOUNTING,
     TravelError: FailureKind.GAUGE_AT_END,
     NoSafePath: FailureKind.NO_WAY,
-    FileError: FailureKind.FILE,
-    DeviceError: FailureKind.OTHER,
+    errors.FileError: FailureKind.FILE,
+    errors.DeviceError: FailureKind.OTHER,
 }
 """The nearest class that an error belongs to decides; any other is final."""
 
@@ -77,7 +69,7 @@ OF_GUARDS: Mapping[Guard, FailureKind] = {
 """Guards that tripped on nothing that a device said; any other is a kind of its own."""
 
 
-def kind_of(error: HexacellError) -> FailureKind:
+def kind_of(error: errors.HexacellError) -> FailureKind:
     """The kind of one failure."""
     if not isinstance(error, GuardTripped):
         return next((KINDS[base] for base in type(error).__mro__ if base in KINDS), FailureKind.FINAL)
@@ -91,7 +83,9 @@ GIVE_UP = Escalations()
 """Every failure ends the run."""
 
 
-def failed(policy: Escalations, error: HexacellError, step: Step | None, state: RunState) -> events.Failed:
+def failed(
+    policy: Escalations, error: errors.HexacellError, step: Step | None, state: RunState
+) -> events.Failed:
     """The event of a failure; of several at once, the one with the most severe action decides."""
     failures: list[events.Failed] = []
     for kind in dict.fromkeys(kind_of(one) for one in causes_of(error)):
@@ -128,10 +122,10 @@ class Recovery:
     commands: CommandLoop
     broker: QuestionBroker
     policy: Escalations
-    halt: Callable[[], Awaitable[HexacellError | None]]
+    halt: Callable[[], Awaitable[errors.HexacellError | None]]
     record: Callable[[events.Event], RunState]
 
-    async def recover(self, error: HexacellError, step: Step | None, state: RunState) -> None:
+    async def recover(self, error: errors.HexacellError, step: Step | None, state: RunState) -> None:
         """Return when the next step may be decided; raises the error that ends the run otherwise.
 
         A failure meanwhile is a failure of its own.
@@ -156,7 +150,7 @@ class Recovery:
                 with suppress(StepCancelled):
                     for event in await self.commands.run_cancellable(self._prepare(error, decided, state)):
                         state = self.record(event)
-            except HexacellError as another:
+            except errors.HexacellError as another:
                 error = another
             else:
                 return
@@ -168,18 +162,18 @@ class Recovery:
         question = ask_recovery(failure.reason, choices(failure))
         try:
             action = Action(str(await self.commands.run_cancellable(self.broker.ask(question))))
-        except AnswerNeeded:
+        except errors.AnswerNeeded:
             return None
         except StepCancelled:
             if reason := self.commands.flags.stopping:
-                raise Interruption(reason) from None
+                raise errors.Interruption(reason) from None
             return None
         if action is Action.ABORT:
             return None
         return failure.model_copy(update={"action": action, "asked": True})
 
     async def _prepare(
-        self, error: HexacellError, failure: events.Failed, state: RunState
+        self, error: errors.HexacellError, failure: events.Failed, state: RunState
     ) -> list[events.SetInvalidated]:
         """Wait, reconnect lost devices, and give the sets that are invalid by that or by the action."""
         if not failure.asked:
@@ -211,18 +205,18 @@ class Reversal:
     def undone(self, error: BaseException) -> BaseException:
         """The error to report once it is reverted: of a written result, that it was undone, and why."""
         is_result = isinstance(self.step, RollBack) and (self.is_recorded or is_evidence_lost(error))
-        if not is_result or not isinstance(error, HexacellError) or may_still_move(error):
+        if not is_result or not isinstance(error, errors.HexacellError) or may_still_move(error):
             return error
         undone = "the new geometry was written and could not be verified; the old config is back."
         if is_evidence_lost(error):  # no journal says so: it cannot be resumed
-            return WriteBackUndone(f"{undone} {error.cause}", action="Begin a new run")
-        return WriteBackUndone(f"{undone} {error}")
+            return errors.WriteBackUndone(f"{undone} {error.cause}", action="Begin a new run")
+        return errors.WriteBackUndone(f"{undone} {error}")
 
-    def failed(self, cause: BaseException, error: HexacellError) -> BaseException:
+    def failed(self, cause: BaseException, error: errors.HexacellError) -> BaseException:
         """The error to report if it cannot be reverted: the cause, and why, unless a resumption may."""
-        if not self.failure or not isinstance(cause, HexacellError):
+        if not self.failure or not isinstance(cause, errors.HexacellError):
             return cause
-        return SeveralErrors(self.failure, [cause, error])
+        return errors.SeveralErrors(self.failure, [cause, error])
 
 
 def revert_unrecorded(event: BaseEvent, state: RunState) -> Reversal | None:
@@ -244,7 +238,7 @@ def revert_at_end(state: RunState, error: BaseException) -> Reversal | None:
     itself is lost, nothing can be recorded in it.
     """
     is_recorded = not is_evidence_lost(error)
-    is_failure = isinstance(error, HexacellError) and not isinstance(error, Interruption)
+    is_failure = isinstance(error, errors.HexacellError) and not isinstance(error, errors.Interruption)
     if is_failure and state.is_unverified:
         failure = "the new geometry was not verified, and could not be taken back"
         return Reversal(RollBack(), failure, is_recorded)

@@ -26,13 +26,7 @@ from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.stated import gauge_travel_of
 from procedures.devices.device_set import Devices, MountedGauge
-from procedures.guards.polling import (
-    DevicePoller,
-    GaugeDeviation,
-    LineActivity,
-    PolledDevices,
-    WatchedController,
-)
+from procedures.guards import polling
 from procedures.guards.position_check import PositionCheck, PositionReports, PositionSource
 from procedures.guards.rules.after_a_move import following_error, stuck_gauge
 from procedures.guards.rules.base import GuardLimits
@@ -145,19 +139,20 @@ class Guards:
 
     def _pollers(
         self, *, controller: bool = False, encoders: bool = True, gauges: "tuple[WatchedGauge, ...]" = ()
-    ) -> PolledDevices:
+    ) -> polling.PolledDevices:
         devices, guards = self.devices, self.settings.guards
-        watched = WatchedController(devices, self.clock, guards.following, guards.stale_s)
+        watched = polling.WatchedController(devices, self.clock, guards.following, guards.stale_s)
         # Gauges behind one multiplexer share a port and so a line.
         ports = {f"gauge {one.name}": one.port or one.name for one in self.settings.gauges}
-        lines: defaultdict[str, LineActivity] = defaultdict(LineActivity)
-        return PolledDevices(
+        lines: defaultdict[str, polling.LineActivity] = defaultdict(polling.LineActivity)
+        return polling.PolledDevices(
             gauges=tuple(
-                DevicePoller(one.device, one.read_deviation, lines[ports[one.device]]) for one in gauges
+                polling.DevicePoller(one.device, one.read_deviation, lines[ports[one.device]])
+                for one in gauges
             ),
-            encoders=DevicePoller("encoders", devices.read_encoders) if encoders else None,
-            controller=DevicePoller("controller", watched.status) if controller else None,
-            stop_input=DevicePoller(STOP_LINE, devices.stop_reason),
+            encoders=polling.DevicePoller("encoders", devices.read_encoders) if encoders else None,
+            controller=polling.DevicePoller("controller", watched.status) if controller else None,
+            stop_input=polling.DevicePoller(STOP_LINE, devices.stop_reason),
         )
 
     def _watched_gauges(self, watched: WatchedSet) -> "tuple[WatchedGauge, ...]":
@@ -181,9 +176,9 @@ class WatchedGauge:
         self._mounted = mounted
         self._reference_mm = reference_mm
 
-    async def read_deviation(self) -> GaugeDeviation:
+    async def read_deviation(self) -> polling.GaugeDeviation:
         """The present deviation from the zero of the set."""
         reading = await self._devices.read_gauge_once(self._mounted.gauge)
         self.displayed.append(reading.raw)
         deviation_mm = self._mounted.axis.coordinate(reading.value_mm) - self._reference_mm
-        return GaugeDeviation(self.axis, deviation_mm)
+        return polling.GaugeDeviation(self.axis, deviation_mm)

@@ -5,17 +5,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import PurePath
 
-from drivers import errors
+from drivers import errors, interfaces
 from drivers.controllers.linuxcnc import protocol, startup
 from drivers.controllers.linuxcnc.commands import ControllerCommands
 from drivers.controllers.linuxcnc.session import Session
-from drivers.interfaces import (
-    ControllerStatus,
-    DeviceIdentity,
-    ReportedPosition,
-    StartupAction,
-    StartupActions,
-)
 from drivers.wire_trace import TraceRecorder
 from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError
@@ -49,7 +42,7 @@ class LinuxcncrshController:
         self._has_changed_modes = False
         self._is_unready = False
 
-    async def open(self) -> DeviceIdentity:
+    async def open(self) -> interfaces.DeviceIdentity:
         """Connect and take control; nothing moves.
 
         Raises:
@@ -58,7 +51,7 @@ class LinuxcncrshController:
         async with self._order:
             commands = await self._session.open()
             config = PurePath(await commands.get_if_known("inifile")).name
-            return DeviceIdentity(
+            return interfaces.DeviceIdentity(
                 name=self._name,
                 protocol="linuxcncrsh",
                 description=", ".join(filter(None, (commands.connection.server, config))),
@@ -73,7 +66,7 @@ class LinuxcncrshController:
         async with self._order:
             await startup.check_coordinate_system(await self._session.synchronized())
 
-    async def prepare(self, permitted: StartupActions) -> None:
+    async def prepare(self, permitted: interfaces.StartupActions) -> None:
         """Leave emergency stop, switch on, home, enter MDI mode. May move the machine.
 
         Coordinates are checked before it is homed, and again afterwards.
@@ -126,19 +119,19 @@ class LinuxcncrshController:
                 if not self._was_stopped_since(stops):  # the stop took control: they are restored later
                     raise
 
-    async def position(self) -> ReportedPosition | None:
+    async def position(self) -> interfaces.ReportedPosition | None:
         """Actual pose and joints; None before all joints are homed, when both may be those of home."""
         async with self._order:
             commands = await self._session.synchronized()
             if not await commands.all_homed():
                 return None
-            return ReportedPosition(await commands.pose(), await commands.joints())
+            return interfaces.ReportedPosition(await commands.pose(), await commands.joints())
 
     async def joints_now(self) -> tuple[float, ...] | None:
         """The six joints, also during ``move``; None before all are homed."""
         return await self._session.joints()
 
-    async def status(self) -> ControllerStatus:
+    async def status(self) -> interfaces.ControllerStatus:
         """Emergency stop, enabled, and error messages; also during ``move``."""
         return await self._session.status()
 
@@ -152,7 +145,7 @@ class LinuxcncrshController:
         """
         await self._session.stop(self._settings.position_tolerance_mm)
 
-    async def reload(self, permitted: StartupActions) -> None:
+    async def reload(self, permitted: interfaces.StartupActions) -> None:
         """Reload its config while it is switched off; joints must not move.
 
         Raises:
@@ -191,12 +184,12 @@ class LinuxcncrshController:
         self._has_changed_modes = False
 
     async def _make_ready(
-        self, commands: ControllerCommands, permitted: StartupActions, stops: int
+        self, commands: ControllerCommands, permitted: interfaces.StartupActions, stops: int
     ) -> None:
         if self._joints_before_reload is not None:  # then it was on, and this driver switched it off
-            permitted |= {StartupAction.SWITCH_ON}
+            permitted |= {interfaces.StartupAction.SWITCH_ON}
         while (action := await startup.next_action(commands)) is not None:
-            if action is StartupAction.RESET_ESTOP:
+            if action is interfaces.StartupAction.RESET_ESTOP:
                 self._joints_before_reload = None  # somebody else switched it off
             if action not in permitted:
                 raise errors.StartupNotPermitted(action, self._name)
@@ -210,11 +203,13 @@ class LinuxcncrshController:
             self._joints_before_reload = None
         await startup.enter_mdi_mode(commands, self._timeouts)
 
-    async def _start_up(self, commands: ControllerCommands, action: StartupAction, stops: int) -> None:
+    async def _start_up(
+        self, commands: ControllerCommands, action: interfaces.StartupAction, stops: int
+    ) -> None:
         match action:
-            case StartupAction.SWITCH_ON:
+            case interfaces.StartupAction.SWITCH_ON:
                 await startup.switch_machine(commands, self._timeouts, on=True)
-            case StartupAction.HOME:
+            case interfaces.StartupAction.HOME:
                 await startup.check_coordinate_system(commands)
                 self._joints_before_reload = None  # they may move
                 limit_s, poll_s = self._settings.homing_timeout_s, self._timeouts.poll

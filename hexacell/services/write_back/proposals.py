@@ -8,20 +8,13 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from hexacell.cell.loader import Cell, is_cell_file, load_cell
+from hexacell.config import write_record
 from hexacell.config.change import ConfigChange
 from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import ConfigLayout, are_same_files, fingerprint
 from hexacell.config.pending_write import held_config
 from hexacell.config.versions import ConfigEditedSince, compare_versions
 from hexacell.config.write_back import commit
-from hexacell.config.write_record import (
-    LaterApproval,
-    WriteCause,
-    WriteKind,
-    approval_path,
-    recorded_write,
-    stated_reason,
-)
 from hexacell.errors import FileError, HexacellError, LimitError, UsageError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import ParameterSet
@@ -172,24 +165,26 @@ async def apply_proposal(
         FileError: the records do not give it.
         CellBusy, FileError, WriteBackUndone: see :func:`~hexacell.config.write_back.commit`.
     """
-    change, reason = proposal.change, stated_reason(reason)
+    change, reason = proposal.change, write_record.stated_reason(reason)
     with held_config(*change.paths):
         if fingerprint(*change.paths) == change.sha256_after:
             return AppliedProposal(proposal, "")
         _require_unedited(proposal)
         await require_as_recorded(proposal)
         by = await _approval(proposal, operator, typed_by)
-        approval = LaterApproval(by=by, at=now()[0], sha256_after=change.sha256_after)
-        approval.save(approval_path(proposal.folder), like=change.path)
+        approval = write_record.LaterApproval(by=by, at=now()[0], sha256_after=change.sha256_after)
+        approval.save(write_record.approval_path(proposal.folder), like=change.path)
         judged = proposal.state.judged
         outcome = "not verified by its run" if judged is None else judged.line
-        cause = WriteCause(WriteKind.APPLIED, by, proposal.folder.name, outcome, reason)
+        cause = write_record.WriteCause(
+            write_record.WriteKind.APPLIED, by, proposal.folder.name, outcome, reason
+        )
         folder, layout = proposal.folder.siblings, proposal.layout
         try:
-            with recorded_write(folder, change.paths, layout, cause) as recording:
+            with write_record.recorded_write(folder, change.paths, layout, cause) as recording:
                 commit(change, proposal.folder.path)
         except BaseException:
-            approval_path(proposal.folder).unlink(missing_ok=True)
+            write_record.approval_path(proposal.folder).unlink(missing_ok=True)
             raise
     return AppliedProposal(proposal, by, recording.problem)
 

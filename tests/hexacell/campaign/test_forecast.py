@@ -161,7 +161,9 @@ def test_an_earlier_result_shares_its_constant_effects(ordinary) -> None:
     zero = np.zeros((35, 6))
     unaware = planned_budget(robot, task, sets, {"scale of each encoder": zero})
     aware = planned_budget(robot, task, sets, {"scale of each encoder": zero + 1e-3})
-    assert alone and unaware and aware
+    assert alone is not None
+    assert unaware is not None
+    assert aware is not None
     assert aware.systematic_mm != pytest.approx(unaware.systematic_mm, rel=0.01)
 
 

@@ -15,13 +15,7 @@ import numpy as np
 
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
-from hexacell.config.interface import (
-    LARGEST_CONFIG_BYTES,
-    ConfigFormat,
-    ConfigPart,
-    ControllerGeometry,
-    ControllerLimits,
-)
+from hexacell.config import interface
 from hexacell.config.linuxcnc_ini import limits_of_ini
 from hexacell.errors import FileError
 from hexacell.kinematics.corrections import NO_CORRECTIONS, CorrectionKind, Corrections
@@ -40,7 +34,7 @@ class FormatOfFile:
     """The format of one file, and what the cell file calls it."""
 
     name: str
-    reader: ConfigFormat
+    reader: interface.ConfigFormat
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,19 +73,21 @@ class ConfigLayout:
         """
         return frozenset().union(*(one.reader.holds for one in self.formats))
 
-    def read(self, *paths: Path) -> ControllerGeometry:
+    def read(self, *paths: Path) -> interface.ControllerGeometry:
         """The geometry in the files, and the corrections.
 
         Raises ``FileError``, with file and line, if a file is absent, unreadable or no such config, or a
         parameter is in none of the files, or in two.
         """
-        parts = self._parts([atomic_files.read_text(path, LARGEST_CONFIG_BYTES) for path in paths], paths)
+        parts = self._parts(
+            [atomic_files.read_text(path, interface.LARGEST_CONFIG_BYTES) for path in paths], paths
+        )
         values = self._values(parts, paths)
         corrections, places = _corrections(parts, paths)
-        return ControllerGeometry(
+        return interface.ControllerGeometry(
             Geometry(self.parameters, [values[name] for name in self.parameters.names]),
             self._branch(parts, paths),
-            reduce(ControllerLimits.narrowed, (part.limits for part in parts)),
+            reduce(interface.ControllerLimits.narrowed, (part.limits for part in parts)),
             corrections,
             frozenset(places),
         )
@@ -135,11 +131,11 @@ class ConfigLayout:
             )
         return tuple(new)
 
-    def _parts(self, texts: Sequence[str], sources: Sequence[Path | None]) -> list[ConfigPart]:
+    def _parts(self, texts: Sequence[str], sources: Sequence[Path | None]) -> list[interface.ConfigPart]:
         files = zip(self.formats, texts, sources, strict=True)
         return [one.reader.read(text, source) for one, text, source in files]
 
-    def _values(self, parts: Sequence[ConfigPart], paths: Sequence[Path]) -> Mapping[str, float]:
+    def _values(self, parts: Sequence[interface.ConfigPart], paths: Sequence[Path]) -> Mapping[str, float]:
         found: dict[str, float] = {}
         for name in self.parameters.names:
             having = [path for part, path in zip(parts, paths, strict=True) if name in part.values]
@@ -148,7 +144,7 @@ class ConfigLayout:
             found[name] = next(part.values[name] for part in parts if name in part.values)
         return found
 
-    def _branch(self, parts: Sequence[ConfigPart], paths: Sequence[Path]) -> Branch:
+    def _branch(self, parts: Sequence[interface.ConfigPart], paths: Sequence[Path]) -> Branch:
         if not self.parameters.has_branch:
             return ()
         found = [(part.branch, path) for part, path in zip(parts, paths, strict=True) if part.branch]
@@ -158,7 +154,7 @@ class ConfigLayout:
 
 
 def _corrections(
-    parts: Sequence[ConfigPart], paths: Sequence[Path]
+    parts: Sequence[interface.ConfigPart], paths: Sequence[Path]
 ) -> tuple[Corrections, Mapping[CorrectionKind, int]]:
     """The corrections in all files, and which of these has a place for each kind.
 
@@ -213,7 +209,7 @@ def _not_in_one(name: str, having: Sequence[Path], paths: Sequence[Path]) -> Fil
     )
 
 
-def controller_geometry(cell: Cell, *paths: Path) -> ControllerGeometry:
+def controller_geometry(cell: Cell, *paths: Path) -> interface.ControllerGeometry:
     """What a cell's config states, or a copy of its files; with the limits of the INI file of the cell.
 
     Raises:
@@ -232,14 +228,14 @@ class CurrentConfig:
     def __init__(self, paths: tuple[Path, ...], layout: ConfigLayout) -> None:
         self._paths = paths
         self._layout = layout
-        self._parsed: tuple[str, ControllerGeometry] | None = None
+        self._parsed: tuple[str, interface.ControllerGeometry] | None = None
 
     @property
     def path(self) -> Path:
         """The config, or its first file, which stands for it in messages."""
         return self._paths[0]
 
-    def geometry(self) -> ControllerGeometry:
+    def geometry(self) -> interface.ControllerGeometry:
         """The geometry that it states now; raises ``FileError``."""
         now = fingerprint(*self._paths)
         if self._parsed is None or self._parsed[0] != now:

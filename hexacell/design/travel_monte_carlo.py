@@ -27,14 +27,8 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from hexacell.design import predicted_records
 from hexacell.design.candidates import ReachableTargets
-from hexacell.design.predicted_records import (
-    CHANCE_SIGMAS,
-    TRAVEL_SHARE,
-    GaugeZero,
-    PredictedRecords,
-    predict_records,
-)
 from hexacell.identification.belief import SPARE_ANGLE, SPARE_SIGMAS, UNCERTAIN_SIGMA, RobotBelief
 from hexacell.kinematics.forward import apply_twist, forward_kinematics
 from hexacell.kinematics.geometry import GeometryBatch
@@ -80,9 +74,9 @@ class TravelConstraint:
     """The chance constraint at a point whose gauges were zeroed at ``zero``."""
 
     belief: RobotBelief
-    zero: GaugeZero
+    zero: predicted_records.GaugeZero
 
-    def holds(self, records: PredictedRecords) -> Mask:
+    def holds(self, records: predicted_records.PredictedRecords) -> Mask:
         """At which of n predicted records the ball almost surely stays inside the travel."""
         holds = self._holds_linearly(records)
         if not holds.all():
@@ -95,10 +89,10 @@ class TravelConstraint:
         Every other pose is checked, the last included: from one to the next little changes.
         """
         targets = ReachableTargets(path.poses[slice(None, None, -2)], path.joints[::-2])
-        linear = self._holds_linearly(predict_records(self.belief, self.zero, targets))
+        linear = self._holds_linearly(predicted_records.predict_records(self.belief, self.zero, targets))
         return bool(linear.all() or self._holds_for_samples(targets[~linear]).all())
 
-    def _holds_linearly(self, records: PredictedRecords) -> Mask:
+    def _holds_linearly(self, records: predicted_records.PredictedRecords) -> Mask:
         if self.is_uncertain:
             return np.zeros(len(records), dtype=bool)
         within = records.within(self.belief.limits, LINEAR_SHARE)
@@ -176,7 +170,7 @@ class _Scenario:
     """The reference, first, and n targets of the estimated robot, for robots sampled from the belief."""
 
     belief: RobotBelief
-    zero: GaugeZero
+    zero: predicted_records.GaugeZero
     joints: Array
     poses: PoseBatch
     sensitivity: FreeSensitivity
@@ -184,7 +178,9 @@ class _Scenario:
     def chance_spread(self, targets: NDArray[np.intp]) -> Array:
         """How far the gauges may be off by chance (n, 3), mm, at some of the targets."""
         covariance = self.belief.noise.chance_covariance(self.sensitivity.joints[1 + targets, :3])
-        return CHANCE_SIGMAS * self.belief.limits.sigma_along_gauges(covariance + self.zero.covariance)
+        return predicted_records.CHANCE_SIGMAS * self.belief.limits.sigma_along_gauges(
+            covariance + self.zero.covariance
+        )
 
     def nearly_all_hold(self) -> Mask:
         """At which targets (n,) the constraint holds on all of many sampled robots but the worst.
@@ -203,7 +199,7 @@ class _Scenario:
             # All but the worst stay within a share of the room; the legs of all that take it are free.
             limits = self.belief.limits
             stay = robots.found & limits.within_travel(robots.deviations, share=UNCERTAIN_SHARE)
-            stay &= limits.within_travel(robots.deviations, spread, TRAVEL_SHARE)
+            stay &= limits.within_travel(robots.deviations, spread, predicted_records.TRAVEL_SHARE)
             are_free = (robots.leg_margins >= 0.0).all(axis=-1)
             within = np.asarray(
                 (np.count_nonzero(~stay, axis=0) <= 1) & (are_free | ~robots.found).all(axis=0)
@@ -263,7 +259,7 @@ def _all_within(sampled: _SampledRobots, limits: Limits, stops: Array, share: fl
     deviations, margins = sampled.deviations, sampled.leg_margins
     spread = (deviations @ limits.frames.base).std(axis=0)
     mean_deviation, both = deviations.mean(axis=0), np.hypot(SIGMAS * spread, stops)
-    stopped = max(share, TRAVEL_SHARE)
+    stopped = max(share, predicted_records.TRAVEL_SHARE)
     predicted = limits.within_travel(mean_deviation, SIGMAS * spread, share)
     predicted &= limits.within_travel(mean_deviation, both, stopped)
     stay = sampled.found & limits.within_travel(deviations, share=share)

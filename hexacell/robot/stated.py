@@ -7,14 +7,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hexacell.cell import uncertainty
 from hexacell.cell.model import CellSettings
-from hexacell.cell.uncertainty import (
-    STOPS,
-    LinearUncertaintySettings,
-    RotaryUncertaintySettings,
-    UncertaintySettings,
-    repeatability_key,
-)
 from hexacell.config.interface import ControllerGeometry, ControllerLimits
 from hexacell.errors import ReachError
 from hexacell.identification.placement import Weight
@@ -170,19 +164,19 @@ def stated_effects(
         return replace(kind(getattr(stated, key)), source=stated.source(key))
 
     effects: list[Effect] = []
-    if isinstance(stated, LinearUncertaintySettings):
+    if isinstance(stated, uncertainty.LinearUncertaintySettings):
         effects.append(of("common_encoder_scale_um_m", effect_kinds.common_encoder_scale))
         # Where the scales are identified, what is not known of them is in the covariance of the parameters.
         if not settings.robot.encoder_scales:
             effects.append(of("encoder_scale_um_m", effect_kinds.encoder_scales))
-    elif isinstance(stated, RotaryUncertaintySettings):
+    elif isinstance(stated, uncertainty.RotaryUncertaintySettings):
         effects.append(of("encoder_eccentricity_mdeg", effect_kinds.encoder_eccentricities))
     joint, unit, acts = words.joint, words.joint_unit, stated.stop_repeatability_acts
     stops = partial(effect_kinds.stop_repeatability, is_in_noise=acts == "at work", joint=joint, unit=unit)
     beside = effect_kinds.command_repeatability(1e3 * settings.noise.stops, joint=joint, unit=unit)
-    effects.append(of(repeatability_key(unit), stops))
-    effects.append(replace(beside, source=stated.sources.get(STOPS, "cell file")))
-    if isinstance(stated, UncertaintySettings):
+    effects.append(of(uncertainty.repeatability_key(unit), stops))
+    effects.append(replace(beside, source=stated.sources.get(uncertainty.STOPS, "cell file")))
+    if isinstance(stated, uncertainty.UncertaintySettings):
         half_mm = 0.5 * (limits.joint_max - limits.joint_min)
         effects += [
             of("rail_direction_mrad", effect_kinds.rail_directions),

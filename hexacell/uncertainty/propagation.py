@@ -19,13 +19,8 @@ from functools import cached_property
 import numpy as np
 
 from hexacell.identification.belief import RobotBelief
+from hexacell.identification.diagnostics import pose_accuracy
 from hexacell.identification.diagnostics.frame_alignment import FrameFit
-from hexacell.identification.diagnostics.pose_accuracy import (
-    error_jacobian,
-    errors_by_terms,
-    placement_of,
-    teachable_frames,
-)
 from hexacell.identification.identified_zeros import IdentifiedZeros
 from hexacell.identification.placement import Placement
 from hexacell.identification.solver.measurement_model import NuisanceElimination
@@ -94,10 +89,10 @@ class Propagation:
         return cls(
             found=found,
             zeros=zeros,
-            task=placement_of(belief, task),
-            workspace=placement_of(belief, workspace),
-            jacobian=error_jacobian(belief, task, workspace),
-            frames=teachable_frames(belief, workspace),
+            task=pose_accuracy.placement_of(belief, task),
+            workspace=pose_accuracy.placement_of(belief, workspace),
+            jacobian=pose_accuracy.error_jacobian(belief, task, workspace),
+            frames=pose_accuracy.teachable_frames(belief, workspace),
             earlier=earlier or {},
             corrections=belief.corrections,
         )
@@ -159,7 +154,7 @@ class Propagation:
 
     def by_terms(self, terms: TermEstimates) -> Array:
         """Errors (t, 6, 6 m) at the task poses by one unit of each coefficient of m terms."""
-        return errors_by_terms(terms.terms, self.frames, self.task, self.workspace)
+        return pose_accuracy.errors_by_terms(terms.terms, self.frames, self.task, self.workspace)
 
     def reversals(self, terms: TermEstimates | None) -> Iterator[Effect]:
         """What nobody knows the side of at work: another error at every stop.
@@ -254,8 +249,10 @@ def errors_by_scale(
     workspace.
     """
     effect = common_encoder_scale(1.0)
-    through = -error_jacobian(belief, task, workspace) @ parameter_columns[COMMON_SCALE]
+    through = -pose_accuracy.error_jacobian(belief, task, workspace) @ parameter_columns[COMMON_SCALE]
     assert effect.on_poses is not None  # noqa: S101 - it moves the sliders
-    at_task, over = (effect.on_poses(placement_of(belief, poses)) for poses in (task, workspace))
-    direct = teachable_frames(belief, workspace).remove_frame_motion(task, at_task, over)
+    at_task, over = (
+        effect.on_poses(pose_accuracy.placement_of(belief, poses)) for poses in (task, workspace)
+    )
+    direct = pose_accuracy.teachable_frames(belief, workspace).remove_frame_motion(task, at_task, over)
     return np.asarray((through + direct)[..., 0])

@@ -23,16 +23,8 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote, unquote
 
 from hexacell.addresses import LINK_LOCAL, address_of, connect_to_no_link_local, is_link_local
+from hexacell.cell import operation
 from hexacell.cell.fields import Password, Section
-from hexacell.cell.operation import (
-    BROKERS,
-    WEBHOOKS,
-    NotificationSettings,
-    Occasion,
-    hosts_of,
-    require_sendable,
-    scheme_of,
-)
 from hexacell.cell.passwords import stated_secrets
 from hexacell.errors import UsageError
 from hexacell.services.unattended.notice import Notice, NoticeUndelivered
@@ -91,7 +83,10 @@ def variable(name: str, part: str) -> str:
 
 
 def resolved_address(
-    settings: NotificationSettings, cell: str, folder: Path, environment: Mapping[str, str] = os.environ
+    settings: operation.NotificationSettings,
+    cell: str,
+    folder: Path,
+    environment: Mapping[str, str] = os.environ,
 ) -> NoticeAddress:
     """The address of a recipient; ``folder`` has the cell file, ``cell`` is the cell's name.
 
@@ -112,7 +107,7 @@ def resolved_address(
         )
     ca_file = None if settings.ca_file is None else folder / settings.ca_file
     try:
-        require_sendable(url)
+        operation.require_sendable(url)
     except UsageError as error:
         raise UsageError(error.problem, subject=settings.name, action=error.action) from error
     topic = settings.topic or f"hexacell/{re.sub(r'[#+/]', '-', cell)}"
@@ -167,10 +162,10 @@ def _attempt(address: NoticeAddress, notice: Notice, longest_s: float) -> None:
 
     def act() -> None:
         try:
-            scheme, send = scheme_of(address.url), send_by_apprise
-            if scheme in WEBHOOKS:
+            scheme, send = operation.scheme_of(address.url), send_by_apprise
+            if scheme in operation.WEBHOOKS:
                 send = post_to_webhook
-            elif scheme in BROKERS:
+            elif scheme in operation.BROKERS:
                 send = publish_by_mqtt
             _require_elsewhere(address)
             send(address, notice, min(TIMEOUT_S, longest_s))
@@ -195,7 +190,7 @@ def _require_elsewhere(address: NoticeAddress) -> None:
     """Refuse a host that is, resolves to, or leads to a link-local address, unless that is on purpose."""
     if address.link_local:
         return
-    if any(is_link_local(host, by_name=True) for host in hosts_of(address.url)):
+    if any(is_link_local(host, by_name=True) for host in operation.hosts_of(address.url)):
         raise NoticeUndelivered(LINK_LOCAL)
     connect_to_no_link_local()  # a name may resolve otherwise by then
 
@@ -263,7 +258,7 @@ def publish_by_mqtt(address: NoticeAddress, notice: Notice, timeout_s: float) ->
     """
     client, answered, answer = _client(address, timeout_s)
     url = address_of(address.url)
-    is_test = Occasion.TEST in notice.occasions
+    is_test = operation.Occasion.TEST in notice.occasions
     try:
         client.connect(url.host, url.port or PORTS[url.scheme])
         client.loop_start()
@@ -303,7 +298,7 @@ def _client(address: NoticeAddress, timeout_s: float) -> tuple[Client, threading
     client.on_connect = heard
     if address.user is not None:
         client.username_pw_set(address.user, address.password)
-    if scheme_of(address.url) == "mqtts":
+    if operation.scheme_of(address.url) == "mqtts":
         try:
             client.tls_set_context(ssl.create_default_context(cafile=address.ca_file))
         except OSError as error:
@@ -349,11 +344,11 @@ def _attachment(notice: Notice) -> Any:  # noqa: ANN401 - as apprise's
 
 
 def _kind(notice: Notice) -> str:
-    if Occasion.PASS in notice.occasions:
+    if operation.Occasion.PASS in notice.occasions:
         return "success"
-    if Occasion.FAILURE in notice.occasions:
+    if operation.Occasion.FAILURE in notice.occasions:
         return "failure"
-    return "info" if Occasion.TEST in notice.occasions else "warning"
+    return "info" if operation.Occasion.TEST in notice.occasions else "warning"
 
 
 def _apprise_url(address: NoticeAddress, timeout_s: float) -> str:

@@ -30,9 +30,6 @@ LARGEST_SHARE_UNKNOWN = 0.5
 """Share of the error at the worst task pose that records may leave of what the drawing does; with more the
 robot would hardly be better."""
 
-NAMED_PARTS = 3
-"""Largest parts of an uncertainty that are named."""
-
 TIMES_THE_LIMIT = 10.0
 """Times the limit that the error may be predicted to be, with two sigma: a plan that leaves more measures
 too little, whatever the noise."""
@@ -214,7 +211,7 @@ def _beyond_any_records(plan: Plan) -> Iterator[HexacellError]:
     if budget is None:
         return
     parts = sorted((line for line in budget.lines if line.combined_mm), key=lambda one: -one.combined_mm)
-    names = ", ".join(f"{one.effect.name} ({shown(one.combined_mm)})" for one in parts[:NAMED_PARTS])
+    names = ", ".join(f"{one.effect.name} ({shown(one.combined_mm)})" for one in parts[:3])
     floor = budget.floor
     for key, error in (("position_mm", floor.position), ("orientation_deg", floor.orientation)):
         least, limit = limits.guard_band_factor * error.expanded, getattr(limits, key)

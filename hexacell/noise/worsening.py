@@ -1,9 +1,8 @@
 """A machine that gets worse during a run: it comes back to later references less well than to the first.
 
-The changes between visits of the first reference and at the ends of the first half of the sets are compared
-with those at the ends of the others by an F test: of what the encoders show, and of what the gauges show
-beside them. Noise that is known explains either, however small the first ones are. Components that go
-together, as of a ball that play moves along one line, count as fewer degrees of freedom (Satterthwaite).
+By an F test of the ends of the later half of the sets against those before and the visits of the first
+reference: of what encoders show, and of what gauges show beside them. Known noise explains either.
+Components that go together, as by play along a line, are fewer degrees of freedom (Satterthwaite).
 """
 
 from collections.abc import Sequence
@@ -20,8 +19,7 @@ SIGNIFICANCE = 0.003
 """Probability of each kind, by a machine that stays as it is, below which it got worse."""
 
 AMONG_ENDS = 0.05
-"""Probability likewise of the ends of sets alone. A slow drift, too small to be found, makes all of these
-larger than visits in short order."""
+"""Likewise of the ends alone: a drift too small to be found makes all larger than visits in short order."""
 
 FEWEST = 2
 """Sets in either half; one set that does not close may be of a gauge that slipped."""
@@ -57,19 +55,12 @@ def worsening_of(changes: Sequence[ReferenceChange], ends: int, noise: Noise) ->
     if ends - later < FEWEST:
         return None
     by_noise = [one.covariance + one.readings * noise.walk_mm**2 * np.eye(3) for one in changes]
-    factors, unexplained = np.linalg.cholesky(by_noise), [one.unexplained_mm for one in changes]
-    joints = np.array([one.joints for one in changes])
-    kinds = {
-        True: joints / (np.sqrt(2.0) * noise.encoders),
-        False: np.linalg.solve(factors, np.array(unexplained)[..., None])[..., 0],
-    }
-    probabilities = {
-        is_seen: _probability(rows, later)
-        for is_seen, rows in kinds.items()
-        if _probability(rows[-ends:], later) < AMONG_ENDS
-    }
-    is_seen = min(probabilities, key=lambda kind: probabilities[kind], default=False)
-    if probabilities.get(is_seen, 1.0) >= SIGNIFICANCE:
+    joints, beside = np.array([one.joints for one in changes]), [one.unexplained_mm for one in changes]
+    of_noise = np.linalg.solve(np.linalg.cholesky(by_noise), np.array(beside)[..., None])[..., 0]
+    kinds = {True: joints / (np.sqrt(2.0) * noise.encoders), False: of_noise}
+    is_seen = min(kinds, key=lambda kind: _probability(kinds[kind], later))
+    rows = kinds[is_seen]
+    if _probability(rows, later) >= SIGNIFICANCE or _probability(rows[-ends:], later) >= AMONG_ENDS:
         return None
     shown = np.array([one.unexplained_mm + one.by_joints @ one.joints for one in changes])
     first, last = (float(np.sqrt(0.5 * np.mean(rows**2))) for rows in np.split(shown, [len(shown) - later]))

@@ -185,11 +185,11 @@ class UncertaintyBudget:
     def floor(self) -> TaskErrors:
         """What no number of records removes: effects but for what differs among those or is estimated."""
         lasting = [line for line in self.lines if not line.effect.is_estimated and line.combined_mm]
-        shares = (
-            line.direct_mm / line.combined_mm if line.effect.occurrence is Occurrence.EVERY_STOP else 1.0
+        every = Occurrence.EVERY_STOP
+        columns = [
+            line.columns * (line.direct_mm / line.combined_mm if line.effect.occurrence is every else 1.0)
             for line in lasting
-        )
-        columns = [share * line.columns for share, line in zip(shares, lasting, strict=True)]
+        ]
         return TaskErrors(np.zeros_like(self.known), _joined(columns, self.noise.shape[:2]))
 
     @property

@@ -1,8 +1,7 @@
 """Gates that an identified geometry must pass before it is written to a controller."""
 
 from collections.abc import Sequence
-
-import numpy as np
+from math import inf, isfinite
 
 from hexacell.cell.fields import Frozen
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
@@ -36,7 +35,7 @@ def gates(
     *,
     residuals: ChiSquareTest,
     change_mm: float = 0.0,
-    largest_change_mm: float = np.inf,
+    largest_change_mm: float = inf,
     expired: Sequence[str] | None = None,
     impossible: Sequence[str] = (),
 ) -> tuple[AcceptanceGate, ...]:
@@ -47,7 +46,7 @@ def gates(
         violations: of the drawing's tolerances.
         residuals: the chi-square test of the residuals.
         change_mm: the largest change of a parameter of the controller's, in the best choice of frames:
-            other frames are no other robot. By default nothing is changed.
+            other frames are no other robot. Without a limit nothing is written.
         largest_change_mm: what may change without a person.
         expired: instruments whose certificate had expired when the run began; None without certificates.
         impossible: coefficients of what is not geometry that no machine has (:func:`impossible_terms`).
@@ -74,19 +73,15 @@ def gates(
             needs_person=True,
             needs_cell_name=True,
         ),
-    ]
-    if np.isfinite(largest_change_mm):  # a robot that moves far from where it did may collide
-        sentence = f"The largest change is {shown(change_mm)}, the choice of frames apart "
-        is_small = change_mm <= largest_change_mm
-        checked.append(
-            AcceptanceGate(
-                name="small change",
-                passed=is_small,
-                sentence=f"{sentence}(limit without a person {largest_change_mm:g} mm).",
-                needs_person=True,
-                needs_cell_name=not is_small,
-            )
-        )
+        AcceptanceGate(  # a robot that moves far from where it did may collide
+            name="small change",
+            passed=change_mm <= largest_change_mm,
+            sentence=f"The largest change is {shown(change_mm)}, the choice of frames apart "
+            f"(limit without a person {largest_change_mm:g} mm).",
+            needs_person=True,
+            needs_cell_name=not change_mm <= largest_change_mm,
+        ),
+    ][: None if isfinite(largest_change_mm) else -1]
     if impossible:
         sentence = " ".join(f"No machine has {one}." for one in impossible)
         checked.append(AcceptanceGate(name="physical", passed=False, sentence=sentence))

@@ -16,9 +16,6 @@ from hexacell.verdict.assessment import SEPARATED_PAIRS, Assessment
 POOR_REPEATABILITY = 2.0
 """Ratio of the scatter of repeated poses to the stated noise from which it is a finding."""
 
-NEGLIGIBLE_MM = 0.001
-"""Smallest error that is printed, mm: that of the numbers in a config."""
-
 NAMED_PARAMETERS = 4
 """Largest number of undetermined parameters that are named; more are counted."""
 
@@ -173,10 +170,9 @@ def _accuracy(assessed: Assessment) -> str:
     if accuracy is None:
         return "The robot can reach none of the task poses: no accuracy can be stated."
     where = "task poses" if assessed.task_named else "poses across the workspace"
-    before, after = accuracy.before.position_rms_mm, accuracy.after.position_rms_mm
-    now = shown(before) if before >= NEGLIGIBLE_MM else f"below {shown(NEGLIGIBLE_MM)}"
+    before, after = shown(accuracy.before.position_rms_mm), shown(accuracy.after.position_rms_mm)
     return (
-        f"At {len(accuracy.poses)} {where} the position error is now {now} (rms), and {shown(after)} "
+        f"At {len(accuracy.poses)} {where} the position error is now {before} (rms), and {after} "
         "with the identified geometry (one sigma)."
     )
 

@@ -11,7 +11,6 @@ from hexacell.cell.measuring import TimingSettings
 from hexacell.clock import CellClock
 from hexacell.errors import DeviceError, HexacellError, consists_only_of, flatten_errors
 from hexacell.kinematics.rotations import Array
-from hexacell.lengths import shown
 from procedures.devices.device_set import Devices, gather_errors
 
 LEAST_WINDOWS = 3
@@ -145,13 +144,11 @@ async def _look(
     settled = Settled(tuple(window))
     gauges = zip(devices.gauges, np.ptp(settled.gauges, axis=0), strict=True)
     moving = [
-        f"gauge {m.gauge.name} by {shown(spread)}"
+        f"gauge {m.gauge.name} by {spread:.3f} mm"
         for m, spread in gauges
         if spread > timing.spread_gauge_mm
     ]
     legs, unit = enumerate(np.ptp(settled.joints, axis=0), start=1), settled.window[0].encoders.unit
     return moving + [
-        f"encoder {leg} by {shown(spread, unit=unit)}"
-        for leg, spread in legs
-        if spread > timing.spread_encoder
+        f"encoder {leg} by {spread:.3f} {unit}" for leg, spread in legs if spread > timing.spread_encoder
     ]

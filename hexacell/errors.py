@@ -5,6 +5,8 @@ from collections.abc import Iterable, Sequence
 from enum import IntEnum
 from pathlib import Path
 
+from hexacell.printable import printable
+
 
 class ExitCode(IntEnum):
     """The exit status of the process; stable, see ``docs/interface.md``."""
@@ -48,12 +50,12 @@ class HexacellError(Exception):
         where = "" if self.subject is None else self.subject
         where += "" if self.line is None else f":{self.line}"
         text = f"{where}: {self.problem}" if where else self.problem
-        return text if self.action is None else f"{text}. {self.action}"
+        return printable(text if self.action is None else f"{text}. {self.action}")
 
     @property
     def cause(self) -> str:
         """The sentence without the next thing to do."""
-        return str(self).removesuffix(f". {self.action}") if self.action else str(self)
+        return str(self).removesuffix(printable(f". {self.action}")) if self.action else str(self)
 
 
 class UsageError(HexacellError):

@@ -119,6 +119,8 @@ def test_commands_show_no_sign_of_hostile_files_and_arguments(typed_here, cell_f
 def test_runs_in_folders_whose_names_are_no_text_are_listed(typed_here, cell, run) -> None:
     runs_folder(cell).mkdir(parents=True)
     run.rename(runs_folder(cell) / "a\u2028\udcffz")
+    (runs_folder(cell) / "damaged\udcff").mkdir()
+    (runs_folder(cell) / "damaged\udcff" / "journal.jsonl").write_text("x\n")
     for command in ("history", "status"):
         listed = typed_here(command, cell.path)
         assert listed.code == 0, listed.err

@@ -186,7 +186,7 @@ async def _run(
     finally:
         # The trace only helps to find faults: whether it can be kept does not decide how a run ends.
         with suppress(FileError):
-            write_own(folder.new_wire(), connected.trace.text().encode())
+            write_own(folder.new_wire(), connected.trace.text().encode(errors="backslashreplace"))
 
 
 def run_started(

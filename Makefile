@@ -10,8 +10,9 @@ ARGS =
 # Tests of devices mostly wait, so that four processes keep two cores busy. In the order of the folders
 # the long files come early; by default files with few tests, which are the long ones, would come last.
 SEVERAL_AT_A_TIME = -n 4 --dist loadfile --no-loadscope-reorder
-# Not even imported, by each of them.
-ELSEWHERE = --ignore=tests/benchmarks --ignore=tests/linuxcnc
+# Not even imported, by each of them. The documents are checked by make lint.
+DOCUMENTS = tests/docs/checks
+ELSEWHERE = --ignore=tests/benchmarks --ignore=tests/linuxcnc --ignore=$(DOCUMENTS)
 RUN = .venv/bin/python -m
 
 # Packages of other software on these paths would take precedence over the pinned ones.
@@ -51,6 +52,7 @@ lint: venv
 	$(RUN) ruff format --check
 	$(RUN) mypy
 	.venv/bin/lint-imports --no-logo
+	$(RUN) pytest -q $(DOCUMENTS)
 
 venv:
 	@.ci/venv "$(PYTHON)"

@@ -8,7 +8,7 @@ from pathlib import Path
 from hexacell.cli.arguments import make_parser
 from hexacell.errors import UsageError
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
 TYPED = re.compile(r"^ *(?:[A-Z_]+=\S+ )*(?:\.venv/bin/|/\S+/bin/)?hexacell (.+)$")
 IN_TEXT = re.compile(r"`hexacell ([^`]+)`")

@@ -8,7 +8,7 @@ from hexacell.cell.devices import GaugeAxis
 from hexacell.cell.loader import schema
 from hexacell.cli.arguments import make_parser
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[3] / "docs"
 
 
 def test_every_command_has_its_section():

@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import sysconfig
+import tarfile
 import tomllib
 from collections.abc import Iterator
 from importlib.metadata import distribution, version
@@ -62,7 +63,11 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The wheel, built from the sdist, which is built with what .venv has, so without network."""
     folder = tmp_path_factory.mktemp("built")
     run(sys.executable, "-m", "build", "--no-isolation", "--outdir", folder, CHECKOUT, folder=folder)
-    assert [path.name for path in folder.glob("*.tar.gz")] == [f"hexacell-{VERSION}.tar.gz"]
+    [sdist] = folder.glob("*.tar.gz")
+    assert sdist.name == f"hexacell-{VERSION}.tar.gz"
+    with tarfile.open(sdist) as archive:
+        licences = {f"hexacell-{VERSION}/{name}" for name in ("LICENSE", "LICENSES/GPL-2.0-or-later.txt")}
+        assert licences <= set(archive.getnames())
     [wheel] = folder.glob("*.whl")
     return wheel
 
@@ -107,8 +112,11 @@ def test_the_wheel_has_the_three_packages_and_nothing_else(unpacked: Path) -> No
 
 
 def test_the_wheel_announces_its_licence_the_program_and_the_plugins(unpacked: Path) -> None:
-    assert "License-Expression: BSD-3-Clause" in information(unpacked, "METADATA")
+    assert "License-Expression: BSD-3-Clause AND GPL-2.0-or-later\n" in information(unpacked, "METADATA")
     assert "Copyright (c) 2026, the hexacell project" in information(unpacked, "licenses/LICENSE")
+    gpl = information(unpacked, "licenses/LICENSES/GPL-2.0-or-later.txt")
+    assert "Version 2, June 1991" in gpl
+    assert "END OF TERMS AND CONDITIONS" in gpl
     announced = information(unpacked, "entry_points.txt")
     assert "[console_scripts]\nhexacell = hexacell.__main__:main" in announced
     groups = set(re.findall(r"^\[(hexacell\..*)\]$", announced, flags=re.MULTILINE))

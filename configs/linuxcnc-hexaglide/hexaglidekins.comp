@@ -34,7 +34,7 @@ pin out bit inv-kins-fail "the last inverse kinematics was asked for a pose out 
 pin out unsigned last-iterations;
 option singleton yes;
 option extra_setup yes;
-license "GPL"; // a LinuxCNC module: version 2 or later, unlike the program that it comes with
+license "GPL"; // SPDX-License-Identifier: GPL-2.0-or-later, unlike the program that it comes with
 author "hexacell";
 ;;
 

@@ -33,6 +33,7 @@ class Group(Enum):
     THERMOMETERS = ("hexacell.thermometers", "thermometer protocol")
     CONFIG_FORMATS = ("hexacell.config_formats", "config format")
     MECHANISMS = ("hexacell.mechanisms", "mechanism")
+    TERMS = ("hexacell.terms", "term beside the geometry")
 
     def __init__(self, entry_points: str, noun: str) -> None:
         self.entry_points = entry_points

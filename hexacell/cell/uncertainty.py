@@ -1,10 +1,11 @@
 """Sections of what records hardly show: sizes of effects, the length check, terms beside the geometry."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Annotated, Any, Literal, Self, get_args
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from hexacell.cell.fields import (
     CertificateSettings,
@@ -15,10 +16,13 @@ from hexacell.cell.fields import (
     Positive,
     Section,
     Text,
+    accepted,
     broken_rule,
     key,
 )
 from hexacell.kinematics.parameters import JointUnit
+from hexacell.plugins import Group, load
+from hexacell.printable import printable
 
 MicrometresPerMetreKelvin = Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]
 COARSEST_SHARE = 1e-3
@@ -251,16 +255,25 @@ class LengthCheckSettings(Section):
         return self
 
 
-TermName = Literal["backlash", "play", "compliance"]
+def _an_installed_term(name: str) -> str:
+    return accepted(name, partial(load, Group.TERMS))
+
+
+TermName = Annotated[Text, AfterValidator(_an_installed_term)]
+BUNDLED_TERMS = ("backlash", "play", "compliance")
+"""Those looked for by default, whose sizes have keys of their own."""
+
+MOST_TERMS = 10
 
 
 class ModelSettings(Section):
     """Terms of the model beside the geometry, which are taken where the records show them."""
 
     terms: tuple[TermName, ...] = key(
-        ("backlash", "play", "compliance"),
-        "terms that records are searched for; compliance with uncertainty.own_weight_n only; [] for none",
-        max_length=3,
+        BUNDLED_TERMS,
+        "terms that records are searched for, those that plug-ins add too; compliance with "
+        "uncertainty.own_weight_n only; [] for none",
+        max_length=MOST_TERMS,
     )
     temperature_c: InRange | None = key(
         None,
@@ -276,3 +289,22 @@ class ModelSettings(Section):
     compliance_um_n: Positive = key(
         0.3, "what the compliance of a leg may be, um/N, 1 sigma before measuring"
     )
+    sizes: dict[str, Positive] = key(
+        {}, "what coefficients of the terms of plug-ins may be, 1 sigma before measuring, by their names"
+    )
+
+    @property
+    def all_sizes(self) -> dict[str, float]:
+        """The sizes of all terms, by their fields; those of plug-ins by their names."""
+        own = {"backlash": self.backlash, "play_mm": self.play_mm, "compliance_um_n": self.compliance_um_n}
+        return own | self.sizes
+
+    @model_validator(mode="after")
+    def _sizes_belong_to_terms(self) -> Self:
+        for name in self.sizes:
+            if name in BUNDLED_TERMS or name not in self.terms:
+                raise broken_rule(
+                    f"sizes has {printable(name)}, which is no term of a plug-in that is looked for",
+                    "Correct the name, or add it to terms; backlash, play and compliance have own keys",
+                )
+        return self

@@ -56,9 +56,9 @@ class Corrections:
     weight_centre_mm: Three | None = None
 
     def of(self, term: str) -> Six:
-        """The coefficients for a term of the model, by its name."""
+        """The coefficients for a term of the model, by its name; zeros where none corrects it."""
         by_name = {"backlash": self.backlash, "play": self.play_mm, "compliance": self.compliance_um_n}
-        return by_name[term]
+        return by_name.get(term, NONE)
 
     @property
     def are_none(self) -> bool:

@@ -13,10 +13,7 @@ from hexacell.config.interface import ControllerGeometry, ControllerLimits
 from hexacell.errors import ReachError
 from hexacell.identification.placement import Weight
 from hexacell.identification.problem.prior import Noise
-from hexacell.identification.terms.backlash import backlash
-from hexacell.identification.terms.compliance import compliance
-from hexacell.identification.terms.play import play
-from hexacell.identification.terms.term import ModelTerm
+from hexacell.identification.terms.term import ModelTerm, StatedMachine
 from hexacell.identification.thermal_expansion import ThermalExpansion
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import Branch, joint_zeros
@@ -27,6 +24,7 @@ from hexacell.limits.gauge_travel import GaugeTravel
 from hexacell.limits.leg_limits import LegLimits
 from hexacell.limits.limits import AxisLimits, Limits, ZeroedRanges
 from hexacell.measurements.records import MEASURED_PARTS
+from hexacell.plugins import Group, created
 from hexacell.uncertainty import effect_kinds
 from hexacell.uncertainty.effects import Effect
 
@@ -239,11 +237,11 @@ def _stated_weight(settings: CellSettings) -> Weight:
 
 def stated_terms(settings: CellSettings) -> tuple[ModelTerm, ...]:
     """The terms beside the geometry that a cell's records are searched for."""
-    stated, newton = settings.model, settings.uncertainty.own_weight_n
-    weight, unit = _stated_weight(settings), settings.mechanism.words.joint_unit
-    terms = {
-        "backlash": backlash(stated.backlash, unit),
-        "play": play(stated.play_mm, weight),
-        "compliance": compliance(stated.compliance_um_n, newton, weight),
-    }
-    return tuple(terms[name] for name in stated.terms if newton or name != "compliance")
+    machine = StatedMachine(
+        settings.model.all_sizes,
+        settings.mechanism.words.joint_unit,
+        _stated_weight(settings),
+        settings.uncertainty.own_weight_n,
+    )
+    made = (created(Group.TERMS, name, machine) for name in settings.model.terms)
+    return tuple(term for term in made if term is not None)

@@ -59,9 +59,9 @@ def _smallest_to_largest(numbers: Six, unit: ShownUnit) -> str:
 def _fate(term: TermResult, found: FoundTerms) -> str:
     if found.is_corrected(term):
         return "corrected by the controller"
-    is_backlash = term.name == CorrectionKind.BACKLASH
+    is_backlash, can_be = term.name == CorrectionKind.BACKLASH, term.name in {*CorrectionKind}
     rest = "scatter at work" if is_backlash else "the geometry does as much as it can"
-    return f"its config has no place for it: {rest}"
+    return f"{'its config has no place for it' if can_be else 'no controller corrects it'}: {rest}"
 
 
 def _sentence(result: TermResult) -> str:

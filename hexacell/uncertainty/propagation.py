@@ -184,8 +184,9 @@ class Propagation:
 
 def _at_every_stop(term: ModelTerm, on_either_side: ErrorsOfSizes, sizes: Array) -> Effect:
     """A term of some sizes (6,) where nobody knows the side."""
-    size = float(np.sqrt(np.mean(sizes**2))) / THOUSANDTH
-    unit, at_work = JointUnit(term.unit).thousandth, Occurrence.STOPS_AT_WORK
+    size, unit, at_work = float(np.sqrt(np.mean(sizes**2))), term.unit, Occurrence.STOPS_AT_WORK
+    if unit in {*JointUnit}:
+        size, unit = size / THOUSANDTH, JointUnit(unit).thousandth
 
     def columns(at: Placement) -> Array:
         return np.asarray(at.by_constraints @ on_either_side(at, np.zeros_like(at.joints), sizes) / size)

@@ -8,7 +8,7 @@ from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.measurement_model import NuisanceElimination, Prediction
 from hexacell.identification.terms.taken import TakenTerms, mean_of, spread_of
 from hexacell.identification.terms.term import ModelTerm
-from hexacell.kinematics.corrections import Corrections
+from hexacell.kinematics.corrections import CorrectionKind, Corrections
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
 
@@ -60,7 +60,7 @@ class TermEstimates:
         """How far joints (6,) stand from where encoders show them, by the side from which they came."""
         beside = np.zeros(LEGS)
         for term in self.terms:
-            if term.needs_directions:
+            if term.name == CorrectionKind.BACKLASH:
                 beside = beside - 0.5 * self.of(term.name)[0] * directions
         return beside
 

@@ -7,7 +7,7 @@ value). The joint's place is between the two that it has when it comes from belo
 import numpy as np
 
 from hexacell.identification.placement import Placement
-from hexacell.identification.terms.term import ModelTerm
+from hexacell.identification.terms.term import ModelTerm, StatedMachine
 from hexacell.kinematics.parameters import LEGS, JointUnit
 from hexacell.kinematics.rotations import Array
 
@@ -17,6 +17,11 @@ def backlash(size: float, unit: JointUnit = JointUnit.MM) -> ModelTerm:
     return ModelTerm(
         "backlash", str(unit), size, _lagging, needs_directions=True, on_either_side=_where_unknown
     )
+
+
+def stated_backlash(machine: StatedMachine) -> ModelTerm:
+    """The backlash that a cell file states."""
+    return backlash(machine.sizes["backlash"], machine.joint_unit)
 
 
 def _lagging(placement: Placement, directions: Array) -> Array:

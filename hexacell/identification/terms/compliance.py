@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 
 from hexacell.identification.placement import Placement, Weight, leg_forces
-from hexacell.identification.terms.term import ModelTerm
+from hexacell.identification.terms.term import ModelTerm, StatedMachine
 from hexacell.kinematics.rotations import Array
 
 UM = 1e-3
@@ -23,6 +23,12 @@ def compliance(size_um_n: float, newton: float, weight: Weight) -> ModelTerm:
         weight=weight,
         of_weight=partial(compliance, size_um_n, newton),
     )
+
+
+def stated_compliance(machine: StatedMachine) -> ModelTerm | None:
+    """The compliance that a cell file states; None of a weight that it does not state."""
+    size = machine.sizes["compliance_um_n"]
+    return compliance(size, machine.newton, machine.weight) if machine.newton else None
 
 
 def _yielding(newton: float, weight: Weight, placement: Placement, _directions: Array) -> Array:

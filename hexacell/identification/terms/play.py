@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 
 from hexacell.identification.placement import Placement, Weight, leg_forces
-from hexacell.identification.terms.term import ModelTerm
+from hexacell.identification.terms.term import ModelTerm, StatedMachine
 from hexacell.kinematics.forward import apply_twist
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
@@ -38,6 +38,11 @@ def play(size_mm: float, weight: Weight) -> ModelTerm:
         weight=weight,
         of_weight=partial(play, size_mm),
     )
+
+
+def stated_play(machine: StatedMachine) -> ModelTerm:
+    """The play that a cell file states."""
+    return play(machine.sizes["play_mm"], machine.weight)
 
 
 def _on_one_side(weight: Weight, placement: Placement, _directions: Array) -> Array:

@@ -7,13 +7,13 @@ are known as a part that all legs share and a part of each of them, both normal 
 that is stated of the term.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from hexacell.identification.placement import Placement, Weight
-from hexacell.kinematics.parameters import LEGS
+from hexacell.kinematics.parameters import LEGS, JointUnit
 from hexacell.kinematics.rotations import Array
 
 LegErrors = Callable[[Placement, Array], Array]
@@ -25,11 +25,32 @@ ErrorsOfSizes = Callable[[Placement, Array, Array], Array]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class StatedMachine:
+    """What a cell file states of which terms are made.
+
+    Attributes:
+        sizes: by the fields of ``[model]``; that of a plug-in's term, which may be absent, by its name.
+        joint_unit: of the joint variables.
+        weight: how that of the platform acts.
+        newton: how heavy it is; 0 where that is not stated.
+    """
+
+    sizes: Mapping[str, float]
+    joint_unit: JointUnit
+    weight: Weight
+    newton: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class ModelTerm:
     """A term of the model, of one kind for all legs.
 
+    The file of a term has a function that makes it of a :class:`StatedMachine`, or None where that states
+    too little, and is announced as an entry point of the group ``hexacell.terms``.
+
     Attributes:
-        name: for people, and in documents.
+        name: of the entry point, for people, and in documents; controllers correct those of
+            :class:`.CorrectionKind`, and no others.
         unit: of its coefficients.
         size: one standard deviation, in its unit, of what a coefficient may be.
         leg_errors: what it does.

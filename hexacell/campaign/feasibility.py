@@ -9,6 +9,7 @@ import numpy as np
 
 from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.planner import Plan
+from hexacell.cell.measuring import MOST_RECORDS
 from hexacell.design.predicted_records import GaugeZero, estimate_gauge_zero
 from hexacell.errors import HexacellError, LimitError, ReachError, UsageError
 from hexacell.identification.belief import RobotBelief
@@ -21,6 +22,7 @@ from hexacell.limits.leg_limits import ROUNDING
 from hexacell.motion.path_check import is_clear
 from hexacell.robot.model import Robot
 from hexacell.robot.virtual_robot import VirtualRobot, robots_within_tolerances
+from hexacell.uncertainty.effect_kinds import COMMON_SCALE
 from hexacell.uncertainty.statement import COVERAGE_FACTOR
 
 LARGEST_SHARE = 0.5
@@ -210,9 +212,11 @@ def _beyond_any_records(plan: Plan) -> Iterator[HexacellError]:
     budget, limits = plan.planned_budget, plan.settings.acceptance.of_errors
     if budget is None:
         return
-    parts = sorted((line for line in budget.lines if line.combined_mm), key=lambda one: -one.combined_mm)
+    measured = () if plan.settings.length_check is None else (COMMON_SCALE,)
+    lines = (line for line in budget.lines if line.combined_mm and line.effect.name not in measured)
+    parts = sorted(lines, key=lambda line: -line.combined_mm)
     names = ", ".join(f"{one.effect.name} ({shown(one.combined_mm)})" for one in parts[:3])
-    floor = budget.floor
+    floor = budget.floor(measured)
     for key, error in (("position_mm", floor.position), ("orientation_deg", floor.orientation)):
         least, limit = limits.guard_band_factor * error.expanded, getattr(limits, key)
         if least > limit:
@@ -246,12 +250,13 @@ def _no_better(plan: Plan) -> Iterator[HexacellError]:
         return
     records = sum(plan.forecaster.planned(start).values())
     needed = records_for(limit / COVERAGE_FACTOR, records, end, plan.systematic_mm or 0.0)
+    enough = f"some {needed} records" if needed and needed <= MOST_RECORDS else "more orientations"
     yield UsageError(
         f"{records} records leave an error of {end:.3g} mm at the worst task pose, one sigma, where the "
         f"limit is {limit:g} and the drawing with its tolerances leaves {now:.3g}",
         subject="[identification]",
-        action=f"Allow {needed or 'more'} records, more tilt, or points farther apart; gauges and encoders "
-        "of another noise need other figures in [noise]",
+        action=f"Allow more tilt, {enough}, or points farther apart; gauges and encoders of "
+        "another noise need other figures in [noise]",
     )
 
 

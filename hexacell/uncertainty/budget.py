@@ -12,7 +12,7 @@ What terms of the model beside the geometry do at the task is known as well, les
 corrects of it; what is not known of their coefficients is part of the noise, with that of the geometry.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -181,10 +181,13 @@ class UncertaintyBudget:
         """U of the largest orientation error, deg."""
         return self._unknown.orientation.expanded
 
-    @cached_property
-    def floor(self) -> TaskErrors:
-        """What no number of records removes: effects but for what differs among those or is estimated."""
-        lasting = [line for line in self.lines if not line.effect.is_estimated and line.combined_mm]
+    def floor(self, measured: Container[str] = ()) -> TaskErrors:
+        """What no number of records removes: effects but for what differs among those, or is estimated.
+
+        Those that are ``measured`` otherwise do not count.
+        """
+        lines = (line for line in self.lines if line.combined_mm and line.effect.name not in measured)
+        lasting = [line for line in lines if not line.effect.is_estimated]
         every = Occurrence.EVERY_STOP
         columns = [
             line.columns * (line.direct_mm / line.combined_mm if line.effect.occurrence is every else 1.0)

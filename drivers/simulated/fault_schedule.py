@@ -38,6 +38,7 @@ class CellFaults:
             "silent": controller.set_silent,
             "forward kinematics": setting(machine, "fails_forward"),
             "old config": setting(machine, "keeps_geometry"),
+            "ignored corrections": setting(machine, "ignores_corrections"),
             "frozen": controller.set_frozen,
         }
         self._switches: dict[str, Mapping[FaultKind, Switch]] = {

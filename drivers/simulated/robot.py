@@ -1,7 +1,7 @@
 """The simulated robot as its controller drives it, with the geometry and the corrections of the config."""
 
 import threading
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import ConfigLayout
 from hexacell.errors import FileError
 from hexacell.kinematics import rotations
+from hexacell.kinematics.corrections import NO_CORRECTIONS
 from hexacell.kinematics.forward import ForwardResult, continue_solution
 from hexacell.kinematics.mechanism import Mechanism, joint_zeros
 from hexacell.kinematics.pose import Pose, PoseBatch
@@ -102,6 +103,7 @@ class SimulatedMachine:
         includes_zeros: the joints that it reports include the zeros of its geometry.
         fails_forward: its forward kinematics fails: the pose that it reports is that of its home.
         keeps_geometry: it does not read its geometry again.
+        ignores_corrections: it reads corrections, and adds none of them to what it sends.
     """
 
     mechanism: Mechanism
@@ -114,6 +116,7 @@ class SimulatedMachine:
     includes_zeros: bool = False
     fails_forward: bool = False
     keeps_geometry: bool = False
+    ignores_corrections: bool = False
 
     def __post_init__(self) -> None:
         self._geometry = self.layout.read(*self.config)
@@ -184,6 +187,8 @@ class SimulatedMachine:
             here = self._pose_now()
             joints = with_longer_legs(self.mechanism, self._geometry, here, self._joints(here))
             new = self.layout.read(*self.config)
+            if self.ignores_corrections:
+                new = replace(new, corrections=NO_CORRECTIONS)
             found = self._pose_at(new, joints, here)
             if not found.found[0]:
                 raise FileError(

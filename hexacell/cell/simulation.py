@@ -53,6 +53,7 @@ FaultKind = Literal[
     "SYNC counter",
     "forward kinematics",
     "old config",
+    "ignored corrections",
 ]
 
 

@@ -9,7 +9,7 @@ verdict on that error under the limit, which needs the evidence. See ``docs/verd
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,6 +31,7 @@ from hexacell.results.result import IdentificationResult, LengthResult, legs_at
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.length_records import JudgedGeometry
+from hexacell.verdict.correction_evidence import correction_test
 from hexacell.verdict.decision import Verdict, VerifiedAccuracy, worst_verdict
 from hexacell.verdict.either_side import places_on_either_side
 from hexacell.verdict.length_check import LengthMeasurements, LengthStatement, length_check, length_result
@@ -126,6 +127,8 @@ class HeldOut:
         left_travel: whether the ball left the gauges' travel with the new geometry.
         length: what was measured with the new geometry in two seats; None without a length check.
         confirming: records at points of their own, measured because a test failed narrowly; else None.
+        under_new: those ``records`` that were commanded with the new geometry, where encoders show what the
+            controller sent.
     """
 
     records: MeasurementSet
@@ -134,6 +137,7 @@ class HeldOut:
     left_travel: bool = False
     length: LengthMeasurements | None = None
     confirming: MeasurementSet | None = None
+    under_new: MeasurementSet = field(default_factory=lambda: MeasurementSet(()))
 
 
 def verify(settings: CellSettings, robot: Robot, found: Identification, held_out: HeldOut) -> Verification:
@@ -156,6 +160,8 @@ def verify(settings: CellSettings, robot: Robot, found: Identification, held_out
         tests = confirmed(tests, updated, np.isin(updated.problem.labels[:, 0], held_out.confirming.points))
     if settings.encoders.are_of_controller and settings.controller.joints_include_zeros:
         tests = with_zeros_doubted(tests)
+    if (corrected := correction_test(robot, held_out.under_new)) is not None:
+        tests = (*tests, corrected)
     belief = robot.belief(updated)
     task = Task.of(settings, robot, belief).reachable(belief)
     budget = task.budget(updated, belief, robot.effects, robot.known_effects)

@@ -129,6 +129,8 @@ def _held_out(settings: CellSettings, state: RunState) -> HeldOut:
         records += _at_points_from(count, samples)
         count += max((sample.at.point for sample in samples), default=0)
     confirming = state.samples(Phase.CONFIRM)
+    # A controller reports its joints without the backlash that it adds.
+    after = () if settings.encoders.are_of_controller else _at_points_from(0, state.samples(Phase.AFTER))
     return HeldOut(
         records=MeasurementSet(tuple(records)),
         before=state.held_out(Phase.BEFORE),
@@ -136,6 +138,7 @@ def _held_out(settings: CellSettings, state: RunState) -> HeldOut:
         left_travel=state.left_travel,
         length=_length_measurements(settings, state) if state.samples(Phase.LENGTH) else None,
         confirming=MeasurementSet(tuple(_at_points_from(count, confirming))) if confirming else None,
+        under_new=MeasurementSet(tuple(after)),
     )
 
 

@@ -1,5 +1,6 @@
 """On the wire: backlash is found, corrected in the config, and verified."""
 
+import re
 from typing import Any
 
 import pytest
@@ -40,3 +41,17 @@ async def test_the_controller_corrects_what_was_found_and_the_machine_passes(mak
     assert judged.verification.after_mm < 0.15 < judged.verification.before_mm
     replayed = await replay(site.folder.path)
     assert not replayed.differences, "a run that is resumed knows of the config's place for corrections"
+
+
+@pytest.mark.slow
+async def test_a_controller_that_reports_success_and_corrects_nothing_is_found_and_rolled_back(make_site):
+    """It reports its joints without backlash either way: no answer contradicts another, the gauges do."""
+    site = make_site(**WORN)
+    before = site.config
+    site.simulated.faults.inject("ignored corrections", "controller")
+    ended = await site.calibrate()
+    [judged] = site.happened(events.ResultValidated)
+    assert site.happened(events.Committed), "the controller took it"
+    assert judged.verdict is Verdict.NOT_EVALUATED, ended.line
+    assert re.search(r"\(The controller adds \d % of the corrections in its config", ended.line)
+    assert site.config == before, "rolled back"

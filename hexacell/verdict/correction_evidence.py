@@ -1,0 +1,59 @@
+"""Whether a controller adds to its joints what its config says that it corrects.
+
+One that reports success and adds nothing contradicts no model: the encoders show where the joints were
+sent, and from there the terms of the model explain where the ball is. But the encoders show as well that
+the joints were not sent further than the inverse kinematics demands.
+"""
+
+import numpy as np
+
+from hexacell.identification.terms.corrected_joints import commanded_joints
+from hexacell.measurements.records import MeasurementSet
+from hexacell.robot.model import Robot
+from hexacell.verdict.model_evidence import ModelTest
+
+LEAST_SHARE = 0.5
+"""Of what the config says, below which a controller does not correct."""
+
+SHARP = 0.1
+"""Standard deviation of that share from which on records tell."""
+
+
+def correction_test(robot: Robot, records: MeasurementSet) -> ModelTest | None:
+    """The test of the corrections of a robot that commands now, by records taken under them.
+
+    A joint that stands beside its command at all poses alike is no evidence.
+
+    Returns:
+        None where nothing is corrected, or the records do not tell.
+    """
+    corrections, states = robot.corrections, (robot.controller, robot.branch)
+    if corrections.are_none or not len(records):
+        return None
+    bare = robot.mechanism.inverse(*states, records.poses)
+    legs, _ = commanded_joints(robot.mechanism, *states, corrections, records.poses)
+    wanted = legs - bare + 0.5 * np.array(corrections.backlash) * records.directions
+    is_known = (records.directions != 0.0) | (np.array(corrections.backlash) == 0.0)
+    beside = [
+        np.stack(
+            [one[rows] - one[rows].mean() for one in (wanted[:, leg], (records.joints - bare)[:, leg])]
+        )
+        for leg, rows in enumerate((is_known & np.isfinite(wanted)).T)
+        if rows.any()
+    ]
+    added, shown = np.concatenate([np.zeros((2, 0)), *beside], axis=1)
+    square = float(added @ added)
+    if square == 0.0:
+        return None
+    share = float(added @ shown) / square
+    scatter = float(np.sqrt(np.mean((shown - share * added) ** 2)))
+    if max(scatter, robot.noise.encoder) > SHARP * np.sqrt(square):
+        return None
+    passed = share >= LEAST_SHARE
+    sentence = "The controller adds to its joints what its config says."
+    if not passed:
+        sentence = (
+            f"The controller adds {100.0 * max(share, 0.0):.0f} % of the corrections in its config, by the "
+            "encoders; see that it reads them, and run again."
+        )
+    return ModelTest(name="corrections", passed=passed, sentence=sentence)

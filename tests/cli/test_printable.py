@@ -110,6 +110,7 @@ def test_commands_show_no_sign_of_hostile_files_and_arguments(typed_here, cell_f
         ["run", cell_folder.cell, name],
         ["report", odd],
         ["devices", f"socket://{name}"],
+        ["devices", "--controller", "\u2028:9"],
     ):
         outcome = typed_here(*typed)
         assert outcome.code == 2, typed

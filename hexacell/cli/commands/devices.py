@@ -3,6 +3,7 @@
 import argparse
 import asyncio
 import sys
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from drivers.discovery.encoders import set_node_id
+from hexacell.addresses import require_host
 from hexacell.cell.fields import SerialPortName, first_mistake
 from hexacell.cli.commands.cell import cell_at
 from hexacell.cli.console import Console
@@ -121,6 +123,8 @@ def _bus(words: str) -> dict[str, Any]:
 
 def _address(words: str) -> tuple[str, int]:
     host, _, port = words.rpartition(":")
-    if not host or not port.isdecimal() or not 0 < int(port) < TCP_PORTS:
-        raise UsageError(f"--controller {words} is not an address", action="Write it like 127.0.0.1:5007")
-    return host, int(port)
+    with suppress(UsageError):
+        require_host(host)
+        if port.isdecimal() and 0 < int(port) < TCP_PORTS:
+            return host, int(port)
+    raise UsageError(f"--controller {words} is not an address", action="Write it like 127.0.0.1:5007")

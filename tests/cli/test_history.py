@@ -87,9 +87,8 @@ def test_a_leg_that_moved_is_told_with_the_night(cell, typed_here) -> None:
     assert set(document) == {"parameters", "runs", "temperatures_c", "changes", "shares_of_limit"}
     (change,) = document["changes"]
     assert set(change) == {
-        "leg", "possible_legs", "after", "before", "noticed",
-        "parameter", "unit", "change", "sigma", "or_parameters", "other_legs",
-        "moved_again", "last_noticed",
+        "leg", "possible_legs", "after", "before", "noticed", "or_parameters",
+        "parameter", "unit", "change", "sigma", "other_legs", "moved_again", "last_noticed",
     }  # fmt: skip
     assert (change["leg"], change["before"]) == (4, "2026-03-06T02:30:00+00:00")
     json.dumps(document, allow_nan=False)

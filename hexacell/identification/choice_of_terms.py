@@ -115,7 +115,10 @@ class _Search:
         for term in taken:
             if rival := self._rival(term, taken):
                 taken, one = tuple(one for one in taken if one is not term), findings[term.name]
-                findings[term.name] = replace(one, finding=Finding.NOT_DISTINCT, rival=rival)
+                told_by = dict.fromkeys(filter(None, (term.shown_by, self.offered[rival].shown_by)))
+                findings[term.name] = replace(
+                    one, finding=Finding.NOT_DISTINCT, rival=rival, told_by=", or ".join(told_by)
+                )
         return ChosenTerms(taken, tuple(findings[name] for name in self.offered))
 
     def _gain(self, name: str, taken: Model) -> tuple[float, ModelTerm]:

@@ -32,7 +32,7 @@ class TermResult(Frozen):
         log_factor: logarithm of the Bayes factor.
         predicted: by how much better points are predicted from the others with it, in the logarithm of the
             density of their records; None where that was not asked.
-        rival: the term that it cannot be told from.
+        rival: the term that it cannot be told from, and ``told_by`` what would tell, in words.
         unit: of its coefficients.
         values: coefficient of each joint or leg; None where it was not taken.
         sigma: one standard deviation of each.
@@ -43,6 +43,7 @@ class TermResult(Frozen):
     log_factor: float
     predicted: float | None = None
     rival: str = ""
+    told_by: str = ""
     unit: str = ""
     values: Six | None = None
     sigma: Six | None = None
@@ -87,6 +88,7 @@ def term_results(found: Identification) -> tuple[TermResult, ...]:
             log_factor=tried.log_factor,
             predicted=None if np.isnan(tried.predicted) else tried.predicted,
             rival=tried.rival,
+            told_by=tried.told_by,
             unit=unit,
             values=values,
             sigma=sigma,

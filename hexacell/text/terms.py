@@ -71,7 +71,9 @@ def _sentence(result: TermResult) -> str:
         case Finding.KNOWN:
             return f"{result.name} is {result.finding}."
         case Finding.NOT_DISTINCT:
-            return f"{result.name} cannot be told apart from {result.rival}; nothing is corrected of it."
+            told_by = f"; what would tell: {result.told_by}" if result.told_by else ""
+            both = f"{result.name} cannot be told apart from {result.rival}"
+            return f"{both}; nothing is corrected of it{told_by}."
         case Finding.NOT_PREDICTED | Finding.FAULTS:
             return f"{result.name} is not taken: {result.finding}."
         case Finding.ONE_SIDE:

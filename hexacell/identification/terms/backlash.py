@@ -15,7 +15,13 @@ from hexacell.kinematics.rotations import Array
 def backlash(size: float, unit: JointUnit = JointUnit.MM) -> ModelTerm:
     """The backlash of each joint; ``size`` is in the unit of the joints."""
     return ModelTerm(
-        "backlash", str(unit), size, _lagging, needs_directions=True, on_either_side=_where_unknown
+        "backlash",
+        str(unit),
+        size,
+        _lagging,
+        needs_directions=True,
+        shown_by="the same poses reached from both sides",
+        on_either_side=_where_unknown,
     )
 
 

@@ -20,6 +20,7 @@ def compliance(size_um_n: float, newton: float, weight: Weight) -> ModelTerm:
         size_um_n,
         partial(_yielding, newton, weight),
         takes_up="own weight",
+        shown_by="records under another known weight",
         weight=weight,
         of_weight=partial(compliance, size_um_n, newton),
     )

@@ -26,7 +26,7 @@ class TermFinding:
         log_factor: logarithm of the Bayes factor, beside the terms that were taken before it.
         predicted: by how much the logarithm of the density of points' records, predicted from all other
             points, is higher with it; NaN where that was not asked.
-        rival: the term that it cannot be told from.
+        rival: the term that it cannot be told from, and ``told_by`` what would tell, in words.
     """
 
     name: str
@@ -34,3 +34,4 @@ class TermFinding:
     log_factor: float
     predicted: float = np.nan
     rival: str = ""
+    told_by: str = ""

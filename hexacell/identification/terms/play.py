@@ -34,6 +34,7 @@ def play(size_mm: float, weight: Weight) -> ModelTerm:
         "mm",
         size_mm,
         partial(_on_one_side, weight),
+        shown_by="poses that pull and push each leg, little and much",
         on_either_side=partial(_on_either_side, weight),
         weight=weight,
         of_weight=partial(play, size_mm),

@@ -56,6 +56,7 @@ class ModelTerm:
         leg_errors: what it does.
         takes_up: the effect of the uncertainty budget that it describes, by its name; empty for none.
         needs_directions: whether it acts by the side from which joints arrive.
+        shown_by: the records that tell it from any other term, in words.
         on_either_side: the errors of legs that may have either sign, as nobody knows on which side they are
             there; None where that is always known.
         weight: under which it acts; None where that does not matter.
@@ -70,6 +71,7 @@ class ModelTerm:
     leg_errors: LegErrors
     takes_up: str = ""
     needs_directions: bool = False
+    shown_by: str = ""
     on_either_side: ErrorsOfSizes | None = None
     weight: Weight | None = None
     of_weight: "Callable[[Weight], ModelTerm] | None" = None

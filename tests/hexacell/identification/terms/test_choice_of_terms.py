@@ -214,3 +214,22 @@ def test_a_weight_that_acts_elsewhere_than_stated_is_named(off_mm: tuple[float, 
         says = [float(number) for number in re.findall(r"([-+]\d+) mm", named[0])]
         assert np.sign(says[axis]) == -np.sign(off_mm[axis])
         assert 15.0 < abs(says[axis]) < 60.0
+
+
+def test_terms_that_cannot_be_told_apart_are_named_with_what_would_tell() -> None:
+    """Each joint arrives from the side to which the force of its leg puts it; then from either."""
+    backlash, play, _ = robot().terms
+    little = replace(world(()), effect=effect_of({"play": 0.4 * SIZES}))
+    either = little.records(own().commands, robot().commanding)
+    placed = identify(replace(robot(), terms=()).problem(either)).placement
+    sides = -np.sign(play.leg_errors(placed, placed.directions) * placed.derivatives.joints).astype(int)
+    alike = [replace(one, directions=tuple(side)) for one, side in zip(either.records, sides, strict=True)]
+    offered = replace(robot(), terms=(backlash, play))
+    results = term_results(identify(offered.problem(MeasurementSet(tuple(alike)))))
+    [one] = [one for one in results if one.finding is Finding.NOT_DISTINCT]
+    assert {one.name, one.rival} == {"backlash", "play"}
+    assert not any(result.is_taken for result in results)
+    said = " ".join(terms_text([one]).split())
+    assert "from both sides" in said
+    assert "pull and push" in said
+    assert taken(identify(offered.problem(either))) == {"play"}, "as was said"

@@ -19,11 +19,11 @@ from tests.benchmarks.machines import bundled
 
 DOWN = np.array([0.0, 0.0, -1.0])
 WEIGHT = Weight(DOWN)
-LEGS_WITH_LENGTHS = ("simulated-hexaglide", "gough-stewart")
+CELLS = ("simulated-hexaglide", "gough-stewart", "linapod", "rotary-cranks")
 SMALL_MM = 1e-4
 
 
-@pytest.fixture(params=LEGS_WITH_LENGTHS)
+@pytest.fixture(params=CELLS)
 def placement(request) -> RecordPlacement:
     cell = bundled(request.param)
     robot = robot_of(cell)

@@ -1,4 +1,4 @@
-"""On the wire: backlash is found, corrected in the config, and verified."""
+"""On the wire: what is not geometry is found, corrected in the config, and verified; a machine a row."""
 
 import re
 from typing import Any
@@ -15,28 +15,45 @@ from tests.native_config import NATIVE
 
 WORN: dict[str, Any] = {
     "identification__orientations": 12,
-    "simulation__joints__backlash": (0.08,) * 6,
     "noise__encoder": 0.006,
     "noise__gauge_mm": 0.006,
     "simulation__gauges__noise_mm": 0.005,
     "simulation__encoders__noise": 0.005,
 }
-"""Play and compliance are parts of the worn demo."""
+LOST = {"simulation__joints__backlash": (0.08,) * 6}
+HEAVY = {"simulation__load__weight_n": 100.0, "uncertainty__own_weight_n": 100.0}
+PLAYS, YIELDS = (
+    {"simulation__legs__play_mm": (0.08,) * 6},
+    {"simulation__legs__compliance_um_n": (0.3,) * 6},
+)
+SIZES = {"backlash": 0.08, "play": 0.08, "compliance": 0.3}
 
 
 @pytest.mark.slow
-async def test_the_controller_corrects_what_was_found_and_the_machine_passes(make_site) -> None:
-    site = make_site(**WORN)
+@pytest.mark.parametrize(
+    ("worn", "names"),
+    [
+        (LOST, ["backlash"]),
+        (PLAYS | HEAVY, ["play"]),
+        (YIELDS | HEAVY, ["compliance"]),
+    ],
+    ids=["backlash", "play", "compliance"],
+)
+async def test_the_controller_corrects_what_was_found_and_the_machine_passes(
+    make_site, worn, names
+) -> None:
+    site = make_site(**WORN | worn)
     ended = await site.calibrate()
     [judged] = site.happened(events.ResultValidated)
     assert judged.verdict is Verdict.PASS, ended.line
     terms = site.happened(events.Identified)[0].result.terms
-    assert [one.name for one in terms if one.is_taken] == ["backlash"]
+    assert [one.name for one in terms if one.is_taken] == names
     written = NATIVE.read(site.cell.config_path).corrections
-    assert not any(written.play_mm + written.compliance_um_n)
-    assert written.backlash == pytest.approx((0.08,) * 6, abs=0.05), "some 0.01 mm are not known"
+    for name, size in SIZES.items():
+        wanted = (size * (name in names),) * 6
+        assert written.of(name) == pytest.approx(wanted, abs=0.7 * size), "some 0.01 mm are not known"
     said = run_terms_text(fold(read_journal(site.folder.journal)))
-    assert said.count("corrected by the controller") == 1
+    assert said.count("corrected by the controller") == len(names)
     assert " mm with the best geometry alone, " in said
     assert judged.verification.after_mm < 0.15 < judged.verification.before_mm
     replayed = await replay(site.folder.path)
@@ -46,7 +63,7 @@ async def test_the_controller_corrects_what_was_found_and_the_machine_passes(mak
 @pytest.mark.slow
 async def test_a_controller_that_reports_success_and_corrects_nothing_is_found_and_rolled_back(make_site):
     """It reports its joints without backlash either way: no answer contradicts another, the gauges do."""
-    site = make_site(**WORN)
+    site = make_site(**WORN, **LOST)
     before = site.config
     site.simulated.faults.inject("ignored corrections", "controller")
     ended = await site.calibrate()

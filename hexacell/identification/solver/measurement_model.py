@@ -32,6 +32,9 @@ WANDERING = 1.5
 LARGEST_AMPLIFICATION = 100.0
 """mm of the ball per mm of a slider. Beyond it a record has no information and its linearization fails."""
 
+MOST_UNKNOWN = 1e8
+"""Variances of noise that a side which nobody knows counts as at most; with more an inverse is rounding."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prediction:
@@ -89,8 +92,9 @@ def _weights(problem: Problem, by_joints: Array) -> Array:
     terms = problem.terms
     if terms is None or not terms.unknown.any():
         return problem.noise.record_weights(by_joints)
-    covariance = problem.noise.record_covariance(by_joints)
-    on_either_side = (by_joints * terms.unknown[:, None, :]) @ np.swapaxes(by_joints, -1, -2)
+    noise, covariance = problem.noise, problem.noise.record_covariance(by_joints)
+    unknown = np.minimum(terms.unknown, MOST_UNKNOWN * max(noise.encoder, noise.gauge_mm) ** 2)
+    on_either_side = (by_joints * unknown[:, None, :]) @ np.swapaxes(by_joints, -1, -2)
     return np.asarray(np.linalg.inv(covariance + on_either_side))
 
 

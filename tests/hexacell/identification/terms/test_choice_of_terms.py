@@ -14,6 +14,7 @@ import pytest
 from hexacell.campaign.online_estimate import OnlineEstimator
 from hexacell.identification.estimator import identify
 from hexacell.identification.placement import Weight
+from hexacell.identification.solver.measurement_model import predict
 from hexacell.identification.solver.result import Identification
 from hexacell.identification.terms.compliance import compliance
 from hexacell.identification.terms.finding import Finding
@@ -110,6 +111,16 @@ def test_unknown_directions_are_no_evidence_of_backlash():
     forgotten = tuple(replace(one, directions=()) for one in measured("backlash").records)
     found = identify(robot().problem(MeasurementSet(forgotten)))
     assert "backlash" not in {one.name for one in found.tried_terms}
+
+
+def test_sides_that_nobody_knows_of_joints_with_absurd_backlash_leave_weights_that_are_positive():
+    found = identified("play")
+    assert found.problem.terms is not None
+    terms = replace(found.problem.terms, unknown=np.full((found.problem.records, 6), 0.0))
+    terms.unknown[:, 5] = 1e12
+    weights = predict(replace(found.problem, terms=terms), found.free, found.prediction.poses).weights
+    assert (np.linalg.eigvalsh(weights) > 0.0).all()
+    np.linalg.cholesky(weights)
 
 
 def test_a_gross_error_beside_play_is_named_and_play_is_taken_all_the_same():

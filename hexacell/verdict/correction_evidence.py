@@ -32,21 +32,17 @@ def correction_test(robot: Robot, records: MeasurementSet) -> ModelTest | None:
         return None
     bare = robot.mechanism.inverse(*states, records.poses)
     legs, _ = commanded_joints(robot.mechanism, *states, corrections, records.poses)
-    wanted = legs - bare + 0.5 * np.array(corrections.backlash) * records.directions
-    is_known = (records.directions != 0.0) | (np.array(corrections.backlash) == 0.0)
-    beside = [
-        np.stack(
-            [one[rows] - one[rows].mean() for one in (wanted[:, leg], (records.joints - bare)[:, leg])]
-        )
-        for leg, rows in enumerate((is_known & np.isfinite(wanted)).T)
-        if rows.any()
-    ]
-    added, shown = np.concatenate([np.zeros((2, 0)), *beside], axis=1)
+    lost = np.array(corrections.backlash)
+    wanted = legs - bare + 0.5 * lost * records.directions
+    rows = ((records.directions != 0.0) | (lost == 0.0)) & np.isfinite(wanted)
+    both = np.where(rows, np.stack([wanted, records.joints - bare]), 0.0)
+    means = both.sum(axis=1, keepdims=True) / np.maximum(rows.sum(axis=0), 1)
+    added, shown = np.where(rows, both - means, 0.0).reshape(2, -1)
     square = float(added @ added)
     if square == 0.0:
         return None
     share = float(added @ shown) / square
-    scatter = float(np.sqrt(np.mean((shown - share * added) ** 2)))
+    scatter = float(np.sqrt(np.sum((shown - share * added) ** 2) / rows.sum()))
     if max(scatter, robot.noise.encoder) > SHARP * np.sqrt(square):
         return None
     passed = share >= LEAST_SHARE

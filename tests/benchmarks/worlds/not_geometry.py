@@ -35,8 +35,8 @@ def effect_of(coefficients: Mapping[str, Array], warmer_k: float = 0.0) -> Effec
     )
 
 
-def terms_of(robot: Robot, centre_mm: Array = CENTRE_MM) -> tuple[ModelTerm, ...]:
+def terms_of(robot: Robot, centre_mm: Array = CENTRE_MM, newton: float = NEWTON) -> tuple[ModelTerm, ...]:
     """What is looked for on a robot whose owner states that weight, and where it acts."""
     base = robot.mechanism.normalize_frames(robot.drawing)[1].base
     weight = Weight(base @ DOWN, centre_mm)
-    return backlash(0.1), play(0.1, weight), compliance(0.3, NEWTON, weight)
+    return backlash(0.1), play(0.1, weight), compliance(0.3, newton, weight)

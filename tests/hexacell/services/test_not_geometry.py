@@ -32,11 +32,7 @@ SIZES = {"backlash": 0.08, "play": 0.08, "compliance": 0.3}
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("worn", "names"),
-    [
-        (LOST, ["backlash"]),
-        (PLAYS | HEAVY, ["play"]),
-        (YIELDS | HEAVY, ["compliance"]),
-    ],
+    [(LOST, ["backlash"]), (PLAYS | HEAVY, ["play"]), (YIELDS | HEAVY, ["compliance"])],
     ids=["backlash", "play", "compliance"],
 )
 async def test_the_controller_corrects_what_was_found_and_the_machine_passes(

@@ -92,18 +92,17 @@ def batched(problem: Problem, free: np.ndarray) -> np.ndarray:
     return np.asarray(problem.solve_poses(free).poses.positions)
 
 
-@pytest.mark.parametrize(
-    ("what", "change", "rows"),
-    [
-        ("one reading off by 1 mm", lambda d: np.add(d, [0.0, 0.0, 1.0]), slice(15, 16)),
-        ("an early reading off by 1 mm", lambda d: np.add(d, [0.0, 0.0, 1.0]), slice(2, 3)),
-        ("all gauges reversed", np.negative, slice(None)),
-    ],
-)
-def test_the_search_for_false_readings_while_measuring_is_quick(
-    table_one, figure, what, change, rows
-) -> None:
+FALSE_READINGS: dict[str, tuple[Callable[[np.ndarray], np.ndarray], slice]] = {
+    "one reading off by 1 mm": (lambda d: np.add(d, [0.0, 0.0, 1.0]), slice(15, 16)),
+    "an early reading off by 1 mm": (lambda d: np.add(d, [0.0, 0.0, 1.0]), slice(2, 3)),
+    "all gauges reversed": (np.negative, slice(None)),
+}
+
+
+@pytest.mark.parametrize("what", FALSE_READINGS)
+def test_the_search_for_false_readings_while_measuring_is_quick(table_one, figure, what: str) -> None:
     """All estimates of a campaign, as ``next`` computes them, beside those of true readings."""
+    change, rows = FALSE_READINGS[what]
     right = measured(table_one, 11)
     records = list(right.records)
     records[rows] = [replace(r, deviation=tuple(change(np.array(r.deviation)))) for r in records[rows]]

@@ -1,4 +1,4 @@
-"""A simulated cell in one process, and the program that calibrates it in another."""
+"""A simulated cell serves a calibration in another process, and ends without leftovers."""
 
 import re
 import signal

@@ -1,4 +1,4 @@
-"""The decision rule."""
+"""The decision rule passes only what is surely within the limit; a wider limit is never worse."""
 
 import math
 

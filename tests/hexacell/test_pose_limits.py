@@ -1,4 +1,4 @@
-"""The limits that a pose would break, in words."""
+"""A pose beyond a limit is refused, in words with the value; one within is not."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The effects of a cell, by the sizes that its file states."""
+"""Each size that a cell file states becomes one effect of the budget, with its source."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Pictures in characters."""
+"""A picture in characters has every point where its numbers are, and round numbers at its ends."""
 
 from hexacell.text.screens.views import PlotView, Series, plot_lines
 

@@ -1,4 +1,4 @@
-"""Encoders against their maker's EDS file."""
+"""Settings of encoders that differ from their maker's EDS file are told, and another device is refused."""
 
 from contextlib import suppress
 from pathlib import Path

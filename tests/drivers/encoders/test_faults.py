@@ -1,4 +1,4 @@
-"""Emergencies, alarms, heartbeats and boot-up messages."""
+"""No sample counts after an emergency, alarm, boot-up or lost heartbeat, and the device is told."""
 
 import math
 from typing import Any

@@ -1,4 +1,4 @@
-"""Instruments with SCPI, on sockets and pseudo-terminals."""
+"""Instruments with SCPI are read on sockets and pseudo-terminals; another setting or device is told."""
 
 from __future__ import annotations
 

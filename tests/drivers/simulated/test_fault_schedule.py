@@ -1,4 +1,4 @@
-"""Faults of a simulated cell, injected at once and on schedule."""
+"""Faults of a simulated cell begin and end at once, or with the move they are stated for."""
 
 from typing import Any
 

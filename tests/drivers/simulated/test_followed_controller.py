@@ -1,4 +1,4 @@
-"""Gauges and encoders that follow the joints which another program prints."""
+"""Gauges and encoders follow the joints that another program prints, also after it starts again."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Checks of robots that were calibrated, and of one that was not, without hardware."""
+"""A check passes an unchanged robot, fails a changed one, and says where its records do not suffice."""
 
 from dataclasses import replace
 from typing import Any

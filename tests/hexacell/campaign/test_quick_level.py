@@ -1,4 +1,4 @@
-"""The quick level of a robot that drifted, without hardware."""
+"""The quick level of a robot that drifted keeps its budget and uses what was known before."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Keys in the unit of the joint variables, and ``[length_check]``."""
+"""Keys are in the unit of the joint variables; lengths are refused where encoders show angles."""
 
 import re
 from pathlib import Path

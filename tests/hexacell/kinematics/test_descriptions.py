@@ -1,4 +1,4 @@
-"""Geometries as 42 numbers, descriptions of parameters, and poses, alone and as arrays."""
+"""Parameters have one order, name and unit everywhere; poses are the same alone and as arrays."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Legs and their distances, encoders' zeros, derivatives and singularity margins."""
+"""Distances of legs, derivatives and singularity margins are those of independent computations."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Limits of commands and robots, passive joints and legs, and the room of gauges."""
+"""No command, joint, leg or gauge goes beyond its limit; who stands beyond may come back."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Paths with gauges at the ball, the way back, and routes of straight lines."""
+"""Paths keep the ball in the gauges' travel, and there is a way back from everywhere."""
 
 from itertools import pairwise
 from types import SimpleNamespace

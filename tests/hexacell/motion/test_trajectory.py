@@ -1,4 +1,4 @@
-"""The actual path of a robot while its controller follows straight lines."""
+"""The computed path of a robot is the one it takes while its controller follows straight lines."""
 
 import numpy as np
 import pytest

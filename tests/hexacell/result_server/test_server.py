@@ -1,4 +1,4 @@
-"""Results by OPC UA, as asyncua's own client on loopback sees them."""
+"""Results by OPC UA reach who may read them, as asyncua's own client sees it, and nobody else."""
 
 import asyncio
 import logging

@@ -1,4 +1,4 @@
-"""An identification as a JSON document."""
+"""The JSON document of an identification has the keys of the interface, and is valid always."""
 
 import json
 

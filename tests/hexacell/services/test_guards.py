@@ -1,4 +1,4 @@
-"""Guards of the whole program with simulated devices, real drivers and the journal."""
+"""A fault during a move stops the robot, in the whole program with real drivers and the journal."""
 
 from collections.abc import Callable
 from typing import Any

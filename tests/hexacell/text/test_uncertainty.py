@@ -1,4 +1,4 @@
-"""The uncertainty budget as ``fit`` prints it."""
+"""The uncertainty budget that ``fit`` prints has a line for every effect that matters."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Effects of mechanisms with and without rails."""
+"""Effects are those that a mechanism can have: of rails only with rails, of discs as a sine."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The drift of a geometry as a prior, and its marginal likelihood."""
+"""The prior of a drifted geometry has the covariance of drawn machines; its likelihood is exact."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""The statement of accuracy."""
+"""U is the quantile of the distributions that have a closed form, and the same each time."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The gates before a geometry may enter a controller, and the verdict on the held-out poses after it."""
+"""No geometry that a gate refuses enters a controller, and noise alone hardly ever counts as worse."""
 
 import re
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The assessment of an identification, its findings and its JSON document."""
+"""The assessment of an identification says first what matters, and names what the data lack."""
 
 import json
 from dataclasses import replace

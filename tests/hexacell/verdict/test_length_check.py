@@ -1,4 +1,4 @@
-"""A length check within the verification of a result, on the bundled cell with a fixture."""
+"""A scale error of all encoders is found by a length check of a run, and counts in its verdict."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Evidence, accuracy and decision on simulated results of the bundled cell."""
+"""A verdict follows from evidence, accuracy and decision; the true error of a pass is within U."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""A length check of a calibrated machine on fake devices, and what may go wrong between the seats."""
+"""A length check finds a scale error, and tells whatever goes wrong between the seats."""
 
 from dataclasses import replace
 from datetime import UTC, datetime

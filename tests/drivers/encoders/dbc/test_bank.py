@@ -1,4 +1,4 @@
-"""Encoders that a DBC file describes, on a virtual bus."""
+"""Encoders by a DBC file are read as the file says; messages and files that do not fit are told."""
 
 import asyncio
 from collections.abc import Callable

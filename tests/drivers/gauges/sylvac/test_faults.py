@@ -1,4 +1,4 @@
-"""Faults of a Sylvac gauge, and their messages."""
+"""No fault of a Sylvac gauge becomes a reading; each is told with what to do."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""MDI blocks."""
+"""The simulated LinuxCNC takes MDI blocks as the real one does, and refuses the same."""
 
 import pytest
 from hypothesis import given

@@ -1,4 +1,4 @@
-"""The chi-square test of the residuals, and its sentence."""
+"""The test of the residuals has the stated probability, and its sentence names the right noise."""
 
 import numpy as np
 import pytest

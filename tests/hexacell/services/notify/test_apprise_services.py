@@ -1,4 +1,4 @@
-"""Mail and chat, through apprise, at a server on loopback."""
+"""Mail and chat by apprise say the result, and no refusal shows a password."""
 
 import email
 import json

@@ -1,4 +1,4 @@
-"""Drivers and simulated gauges over real pseudo-terminals and sockets, at the pace of a real line."""
+"""Drivers and simulated gauges understand each other over real lines, at the pace of a real one."""
 
 import asyncio
 import logging

@@ -110,6 +110,8 @@ def test_it_says_of_what_by_what_and_by_which_rule(certificate, run, typed_here)
     rule = statement.findtext("dcc:description/dcc:content", namespaces=NAMES)
     assert rule is not None
     assert rule.startswith("Decision rule: pass if")
+    assert "in one round of visits to all task poses, and U" in rule
+    assert "ISO 9283" in rule
     equipment = list(root.iterfind(".//dcc:measuringEquipment", NAMES))
     texts = {
         one.findtext("dcc:name/dcc:content", namespaces=NAMES): list(one.itertext()) for one in equipment

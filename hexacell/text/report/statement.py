@@ -54,7 +54,7 @@ def statement_chapter(run: ReportedRun) -> Chapter:
         for name, unit, one in errors
         for shown in [one.shown_in(unit)]
     )
-    title = "" if accuracy is None else f"Largest error at {accuracy.poses} task poses"
+    title = "" if accuracy is None else f"Largest error, one round of {accuracy.poses} task poses"
     blocks: list[Block] = [
         Paragraph(meaning, is_strong=True),
         *([Table((title, "error", "U (k = 2)", "limit", "verdict"), rows)] if rows else []),
@@ -141,8 +141,10 @@ def decision_rule(accuracy: VerifiedAccuracy | None) -> str:
     band = "U" if factor == 1.0 else f"{factor:g} U"
     return (
         f"Decision rule: pass if error + {band} is at most the limit, fail if error - {band} is above it, "
-        "conditional in between (guard band as in ILAC-G8). U is the expanded uncertainty of the largest "
-        f"error of all task poses, which holds in 95 of 100 cases (k = {COVERAGE_FACTOR:g})."
+        "conditional in between (guard band as in ILAC-G8). The error is the largest in one round of visits "
+        "to all task poses, and U its expanded uncertainty, which holds in 95 of 100 cases "
+        f"(k = {COVERAGE_FACTOR:g}). In the terms of ISO 9283 it has pose accuracy and pose repeatability, as "
+        "far as that was stated or measured, together."
     )
 
 

@@ -85,7 +85,7 @@ class ToldRun:
             at = BEGUN + timedelta(seconds=5 * self.events)
             self.tell(EventRecorded(sequence=self.events, at=at, event=event))
 
-    def begin(self, cell: Cell, *, expected_records: int = 150, in_control: bool = True) -> None:
+    def begin(self, cell: Cell) -> None:
         """What every run tells first."""
         folder = Path("runs/simulated-hexaglide/2026-03-02T080000Z")
         self.tell(
@@ -94,9 +94,9 @@ class ToldRun:
                 cell_file=cell.path,
                 folder=folder,
                 mode="optimise",
-                expected_records=expected_records,
+                expected_records=150,
             ),
-            ControlChanged(is_in_control=in_control, who="ada"),
+            ControlChanged(is_in_control=True, who="ada"),
             StatusChanged(status=Status.RUNNING),
         )
 

@@ -31,10 +31,16 @@ def verdict(likeliest: ErrorEstimate, guarded: ErrorEstimate) -> Verdict:
     return guarded_verdict(likeliest.errors, guarded.errors, LIMITS)
 
 
-def test_a_pass_holds_for_both_estimates() -> None:
-    sure, unsure = at_one_pose(sigma=0.03), at_one_pose(sigma=0.1)
-    assert verdict(sure, sure) is Verdict.PASS
-    assert verdict(sure, unsure) is Verdict.CONDITIONAL_PASS
+@pytest.mark.parametrize(
+    ("likeliest", "guarded", "expected"),
+    [
+        (at_one_pose(sigma=0.03), at_one_pose(sigma=0.03), Verdict.PASS),
+        (at_one_pose(sigma=0.03), at_one_pose(sigma=0.1), Verdict.CONDITIONAL_PASS),
+        (at_one_pose((0.3, 0.0, 0.0), 0.03), at_one_pose((0.2, 0.0, 0.0), 0.1), Verdict.FAIL),
+    ],
+)
+def test_a_pass_holds_for_both_estimates_and_a_fail_needs_the_likeliest_only(likeliest, guarded, expected):
+    assert verdict(likeliest, guarded) is expected
 
 
 def test_of_the_guarded_errors_a_pass_keeps_u_alone() -> None:
@@ -44,11 +50,6 @@ def test_of_the_guarded_errors_a_pass_keeps_u_alone() -> None:
     assert decide_both(unsure.errors.position, unsure.errors.orientation, wide) is not Verdict.PASS
     assert guarded_verdict(sure.errors, unsure.errors, wide) is Verdict.PASS
     assert guarded_verdict(unsure.errors, unsure.errors, wide) is not Verdict.PASS
-
-
-def test_a_fail_needs_the_likeliest_only() -> None:
-    bad, unsure = at_one_pose((0.3, 0.0, 0.0), 0.03), at_one_pose((0.2, 0.0, 0.0), 0.1)
-    assert verdict(bad, unsure) is Verdict.FAIL
 
 
 def test_an_orientation_out_of_limits_fails() -> None:
@@ -68,20 +69,16 @@ def test_systematic_effects_count_beside_the_covariance() -> None:
     assert both.after(1e9 * np.eye(3)).errors.position.expanded == pytest.approx(0.04 * QUANTILE, rel=0.02)
 
 
-def test_the_forecast_is_the_first_number_with_which_the_interval_is_inside() -> None:
+def test_the_forecast_is_the_first_number_with_which_the_interval_is_inside_for_both_estimates() -> None:
     # The variance after n records of information i is 1 / (100 + n i).
     needed = ((QUANTILE / 0.15) ** 2 - 100.0) / 20.0
-    found = records_to_decide(at_one_pose(), at_one_pose(), LIMITS, 20.0 * np.eye(3))
+    found, guarded = (
+        records_to_decide(at_one_pose(), one, LIMITS, 20.0 * np.eye(3))
+        for one in (at_one_pose(), at_one_pose(sigma=1.0))
+    )
     assert found == pytest.approx(np.ceil(needed), abs=1)
-
-
-def test_the_guarded_estimate_delays_a_pass() -> None:
-    slow = at_one_pose(sigma=1.0)
-    alone = records_to_decide(at_one_pose(), at_one_pose(), LIMITS, 20.0 * np.eye(3))
-    guarded = records_to_decide(at_one_pose(), slow, LIMITS, 20.0 * np.eye(3))
-    assert alone is not None
     assert guarded is not None
-    assert guarded > alone
+    assert guarded > found
 
 
 def test_an_error_as_large_as_the_limit_is_never_decided() -> None:

@@ -121,19 +121,25 @@ def ordinary(make_plan):
 
 def test_exact_records_are_those_of_a_virtual_robot_without_errors_and_noise(make_plan) -> None:
     robot = make_plan().robot
-    silent = replace(robot, noise=replace(robot.noise, encoder=0.0, gauge_mm=0.0))
-    commands = [Pose(100.0, -100.0, 500.0), Pose(101.0, -100.0, 499.0, 5.0, -8.0, 12.0)]
+    silent = replace(robot, noise=replace(robot.noise, encoder=0.0, gauge_mm=0.0, stops=0.0))
+    tilted = [Pose(101.0, -100.0, 499.0, 5.0, -8.0, 12.0), Pose(99.0, -98.0, 503.0, -6.0, 5.0, -14.0)]
+    commands = [Pose(100.0, -100.0, 500.0), *tilted]
     virtual = VirtualRobot(silent, robot.commanding)
     measured = []
     for orientation, command in enumerate(commands, start=1):
         virtual.place(command)
         measured.append(virtual.measure(2, orientation))
     found = [*exact_records(robot, 2, robot.from_commands(commands))]
-    assert [one.id for one in found] == [(2, 1), (2, 2)]
+    assert [one.id for one in found] == [(2, 1), (2, 2), (2, 3)]
     for one, expected in zip(found, measured, strict=True):
         assert one.pose.as_tuple() == pytest.approx(expected.pose.as_tuple(), abs=1e-9)
         assert one.joints == pytest.approx(expected.joints, abs=1e-6)
         assert one.deviation == pytest.approx(expected.deviation, abs=1e-6)
+    ways, directions = np.diff([one.joints for one in found], axis=0), [one.directions for one in found]
+    assert directions[0] == (0,) * 6
+    sure = np.abs(ways) > 0.3
+    np.testing.assert_array_equal(np.array(directions[1:])[sure], np.sign(ways)[sure])
+    assert sure.mean() > 0.8
 
 
 def test_it_is_that_of_a_campaign_that_was_carried_out(ordinary, paper) -> None:

@@ -1,6 +1,5 @@
 """Poses are chosen where little is known, with margins, and where the robot is elsewhere."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +9,6 @@ from hexacell.campaign import pose_chooser
 from hexacell.campaign.decisions import CampaignState, MeasurePose
 from hexacell.campaign.feasibility import unreachable_share
 from hexacell.campaign.online_estimate import OnlineEstimator
-from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_chooser import FIRST_TURN
 from hexacell.design import travel_monte_carlo
 from hexacell.design.candidates import ReachableTargets, outcomes_of
@@ -23,7 +21,7 @@ from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import free_sensitivity
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.virtual_robot import VirtualRobot, random_robot, robots_within_tolerances
-from tests.hexacell.campaign.conftest import Campaign, Taken, make
+from tests.hexacell.campaign.conftest import Campaign, make
 
 TRAVEL_MM = 5.0
 
@@ -117,18 +115,6 @@ def test_an_interrupted_run_goes_on_from_the_reference_undisturbed_where_a_line_
 Choice = tuple[TravelConstraint, ReachableTargets]
 
 
-def choices(plan: Plan, campaign: list[Taken]) -> Iterator[Choice]:
-    """Each pose that was chosen when the orientation was no longer uncertain."""
-    for one in campaign:
-        if not isinstance(one.decision, MeasurePose):
-            continue
-        estimate = plan.estimate(one.state)
-        constraint = TravelConstraint(estimate.belief, estimate.gauge_zero(one.decision.point))
-        if not constraint.is_uncertain:
-            commands = plan.robot.from_commands([one.decision.pose])
-            yield constraint, outcomes_of(estimate.belief, commands)[0]
-
-
 def margins(choice: Choice) -> tuple[Array, Array, Array]:
     """What is left by the estimate, its standard deviations, and what the orientation's would ask for."""
     constraint, targets = choice
@@ -141,7 +127,16 @@ def margins(choice: Choice) -> tuple[Array, Array, Array]:
 
 @pytest.fixture(scope="module")
 def chosen(two_points, campaign) -> list[Choice]:
-    return list(choices(two_points, campaign))
+    """Each pose that was chosen when the orientation was no longer uncertain."""
+    found = []
+    for one in campaign:
+        if isinstance(one.decision, MeasurePose):
+            estimate = two_points.estimate(one.state)
+            constraint = TravelConstraint(estimate.belief, estimate.gauge_zero(one.decision.point))
+            commands = two_points.robot.from_commands([one.decision.pose])
+            if not constraint.is_uncertain:
+                found.append((constraint, outcomes_of(estimate.belief, commands)[0]))
+    return found
 
 
 def test_they_have_five_standard_deviations_left(chosen) -> None:

@@ -61,27 +61,20 @@ def test_a_blocked_straight_line_is_replaced_by_a_route_over_a_waypoint(make_rig
     assert next_step(rig.calibration, after).key == "P1/o01/move"
 
 
-def test_a_return_to_the_reference_is_checked_against_the_travel(recording, calibration, monkeypatch):
+@pytest.mark.parametrize("is_away", [False, True])
+def test_a_return_to_the_reference_is_checked_against_the_travel_unless_the_ball_is_away(
+    recording, calibration, monkeypatch, is_away
+):
+    """The gauges' travel cannot be required of a ball that is outside already."""
     sampled = recording.until(events.RecordTaken, count=5)
-    here = sampled[-1].pose
+    here = ELSEWHERE if is_away else sampled[-1].pose
     asked = spy(monkeypatch)
     step = next_step(calibration, fold([*sampled, INTERRUPTED, located(here)]))
     assert step.key == "P1/o01/move"
     ((start, end, reference),) = asked
     assert start.as_tuple() == pytest.approx(here)
-    assert end == Pose(*sampled[-1].pose[:3]) or end.a == pytest.approx(0.0)
-    assert reference is not None
-
-
-def test_a_robot_away_from_the_ball_returns_on_a_line_checked_without_the_travel(
-    recording, calibration, monkeypatch
-) -> None:
-    """The gauges' travel cannot be required of a ball that is outside already."""
-    sampled = recording.until(events.RecordTaken, count=5)
-    asked = spy(monkeypatch)
-    step = next_step(calibration, fold([*sampled, INTERRUPTED, located(ELSEWHERE)]))
-    assert step.key == "P1/o01/move"
-    assert [reference for *_, reference in asked] == [None]
+    assert end.a == pytest.approx(0.0)
+    assert (reference is None) is is_away
 
 
 def test_visited_poses_serve_as_waypoints(recording, calibration, monkeypatch) -> None:

@@ -79,21 +79,16 @@ async def require_finished(rig: Any) -> None:
 
 
 @pytest.mark.slow
-async def test_an_abort_at_a_reference_pose_reverts_the_provisional_geometry(rig) -> None:
+@pytest.mark.parametrize(
+    ("kind", "count"), [(events.SetClosed, 1), (events.RecordTaken, 2), (events.RecordTaken, 5)]
+)
+async def test_an_abort_reverts_the_provisional_geometry_at_a_reference_and_otherwise_when_resumed(
+    rig, kind, count
+):
     before = rig.config
     with pytest.raises(Interruption):
-        await rig.run(on(events.SetClosed, lambda: rig.engine.queue.put(Abort())))
-    assert rig.config == before
-    await require_finished(rig)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("count", [2, 5])
-async def test_an_abort_within_a_set_leaves_the_provisional_geometry_until_the_run_resumes(rig, count):
-    before = rig.config
-    with pytest.raises(Interruption):
-        await rig.run(on(events.RecordTaken, lambda: rig.engine.queue.put(Abort()), count))
-    assert rig.config != before
+        await rig.run(on(kind, lambda: rig.engine.queue.put(Abort()), count))
+    assert (rig.config == before) is (kind is events.SetClosed)
     await require_finished(rig)
 
 

@@ -1,6 +1,7 @@
 """Each guard applied to a snapshot: no trip without a fault, otherwise a problem and an action."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -65,24 +66,9 @@ WELL = PolledDevices(
 
 
 def tripped(limits: GuardLimits = LIMITS, **changes: Any) -> Trip:
-    from dataclasses import replace
-
     trip = first_trip(replace(WELL, **changes), limits)
     assert trip is not None
     return trip
-
-
-def test_a_snapshot_without_faults_trips_no_guard() -> None:
-    assert first_trip(WELL, LIMITS) is None
-    assert first_trip(PolledDevices(), LIMITS) is None
-
-
-def test_a_device_without_an_answer_trips_only_by_its_silence() -> None:
-    unanswered = PolledDevices(
-        (polled("gauge x"),), polled("encoders"), polled("controller"), polled("stop line")
-    )
-    assert first_trip(unanswered, LIMITS) is None
-    assert tripped(encoders=polled("encoders", silent_s=0.13)).guard is Guard.STALE
 
 
 ALARM = DeviceError("reports no magnet", subject="leg 3", action="Look at it")
@@ -116,11 +102,16 @@ def test_a_fault_trips_its_guard_with_device_and_reason(changes, guard, device, 
 @pytest.mark.parametrize(
     "harmless",
     [
+        WELL,
+        PolledDevices(),
+        PolledDevices(
+            (polled("gauge x"),), polled("encoders"), polled("controller"), polled("stop line")
+        ),  # without an answer yet
         PolledDevices(controller=status("joint 3 following error")),  # it is enabled
         PolledDevices((gauge(None, None, error=AT_END),)),  # a plunger at its end may leave it
     ],
 )
-def test_what_explains_itself_trips_no_guard(harmless: PolledDevices) -> None:
+def test_a_snapshot_without_a_fault_trips_no_guard(harmless: PolledDevices) -> None:
     assert first_trip(harmless, LIMITS) is None
 
 

@@ -1,6 +1,7 @@
 """Listeners that step in at a moment of a run or let it fail, and what its journal says of it."""
 
 import asyncio
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -49,11 +50,13 @@ def steps_of(rig: Any) -> list[Any]:
     return [event.step for event in happened(rig, events.StepBegun)]
 
 
-def at_step(key: str, action: Any) -> Any:
-    """A listener that does something whenever a step is begun."""
+def at_step(key: str, action: Callable[[], Any], times: float = math.inf) -> Any:
+    """A listener that does something whenever a step is begun, at most so many times."""
+    left = [times]
 
     def listener(event: events.Event, _: RunState) -> None:
-        if isinstance(event, events.StepBegun) and event.step.key == key:
+        if isinstance(event, events.StepBegun) and event.step.key == key and left[0]:
+            left[0] -= 1
             action()
 
     return listener
@@ -123,16 +126,8 @@ SILENT = GaugeSilent("does not answer", subject="gauge y")
 KEY = "P2/o03/sample"
 
 
-def failing(key: str, action: Callable[[], Any], times: int = 1) -> Any:
-    """A listener that does something whenever a step is begun, so many times."""
-    left = [times]
-
-    def listener(event: events.Event, _: RunState) -> None:
-        if isinstance(event, events.StepBegun) and event.step.key == key and left[0]:
-            left[0] -= 1
-            action()
-
-    return listener
+def failing(key: str, action: Callable[[], Any], times: float = 1) -> Any:
+    return at_step(key, action, times)
 
 
 async def until_closed(rig: Any, *listeners: Any, policy: Escalations) -> bool:

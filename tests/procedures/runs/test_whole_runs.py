@@ -16,7 +16,6 @@ from procedures.calibration.calibration import Mode
 from procedures.run.keys import Phase
 from procedures.run.state import fold
 from procedures.steps import events
-from procedures.steps.sample import Sample
 from tests.geometries import hexaglide_geometry
 from tests.procedures.runs.listening import happened
 
@@ -109,7 +108,7 @@ async def test_a_check_whose_budget_is_used_says_how_many_records_would_decide(m
 
 
 def test_records_know_from_which_side_joints_arrived(recording) -> None:
-    """That is how they moved at the end of the controller's straight line."""
+    """As they moved at the end of the controller's straight line, to where the robot then stands."""
     mechanism, checked = Hexaglide(), 0
     geometry = hexaglide_geometry(**recording.history[0].controller)
     branch, here, arrived = recording.history[0].branch, None, None
@@ -129,17 +128,10 @@ def test_records_know_from_which_side_joints_arrived(recording) -> None:
             here, arrived = event.pose, event
         if isinstance(event, events.RecordTaken):
             assert arrived is not None
+            assert (event.at, event.orientation, event.pose) == (
+                arrived.at,
+                arrived.orientation,
+                arrived.pose,
+            )
             assert event.record.directions == event.reading.directions == arrived.directions
     assert checked > 100
-
-
-def test_samples_are_taken_only_where_the_robot_stands(recording) -> None:
-    """Between a sample and the last arrival at its pose nothing has moved."""
-    arrived = None
-    for event in recording.history:
-        if isinstance(event, events.Arrived):
-            arrived = event
-        if isinstance(event, events.StepBegun) and isinstance(event.step, Sample):
-            assert arrived is not None
-            assert (arrived.at, arrived.orientation) == (event.step.at, event.step.orientation)
-            assert arrived.pose == event.step.pose

@@ -1,30 +1,12 @@
 """Every command that a page shows is one that the program takes."""
 
-import re
 import shlex
-from collections.abc import Iterator
-from pathlib import Path
 
 from hexacell.cli.arguments import make_parser
 from hexacell.errors import UsageError
+from tests.docs.pages import ROOT, UNFINISHED, commands_of
 
-ROOT = Path(__file__).parents[3]
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
-TYPED = re.compile(r"^ *(?:[A-Z_]+=\S+ )*(?:\.venv/bin/|/\S+/bin/)?hexacell (.+)$")
-IN_TEXT = re.compile(r"`hexacell ([^`]+)`")
-UNFINISHED = re.compile(r"\.\.\.|\||\[")
-"""Of a description of commands, which nobody can type as it is."""
-
-
-def commands_of(page: Path) -> Iterator[tuple[int, str]]:
-    """The commands of a page, with their lines."""
-    is_fenced = False
-    for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), start=1):
-        is_fenced ^= line.startswith("```")
-        if (is_fenced or line.startswith("    ")) and (typed := TYPED.match(line)):
-            yield number, typed[1]
-        for told in IN_TEXT.findall(line):
-            yield number, told
 
 
 def words_of(command: str) -> list[str]:
@@ -38,7 +20,7 @@ def test_the_program_takes_every_command_of_the_pages():
     commands = [
         (page.name, number, command)
         for page in PAGES
-        for number, command in commands_of(page)
+        for number, command in commands_of(page.read_text(encoding="utf-8"))
         if not UNFINISHED.search(command)
     ]
     assert len(commands) > 100

@@ -75,9 +75,8 @@ def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         (folder / path).mkdir(parents=True)
     text = (ROOT / "configs/simulated-hexaglide.toml").read_text()
     text = text.replace('"simulated-hexaglide"', '"my-robot"')
-    report = "".join(
-        f'{key} = "A"\n' for key in ("serial_number", "laboratory", "customer", "authorised_by")
-    )
+    stated = ("serial_number", "laboratory", "customer", "authorised_by")
+    report = "".join(f'{key} = "A"\n' for key in stated)
     shutil.copy(ROOT / "configs/simulated-hexaglide.controller.toml", folder)
     with webhook() as hook:
         (folder / "my-robot.toml").write_text(

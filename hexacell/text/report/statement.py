@@ -141,10 +141,10 @@ def decision_rule(accuracy: VerifiedAccuracy | None) -> str:
     band = "U" if factor == 1.0 else f"{factor:g} U"
     return (
         f"Decision rule: pass if error + {band} is at most the limit, fail if error - {band} is above it, "
-        "conditional in between (guard band as in ILAC-G8). The error is the largest in one round of visits "
-        "to all task poses, and U its expanded uncertainty, which holds in 95 of 100 cases "
-        f"(k = {COVERAGE_FACTOR:g}). In the terms of ISO 9283 it has pose accuracy and pose repeatability, as "
-        "far as that was stated or measured, together."
+        "conditional in between (guard band as in ILAC-G8). The error is the largest in one round of "
+        "visits to all task poses, and U its expanded uncertainty, which holds in 95 of 100 cases "
+        f"(k = {COVERAGE_FACTOR:g}). In the terms of ISO 9283 it has pose accuracy and pose repeatability "
+        "together, the latter as far as it was stated or measured."
     )
 
 

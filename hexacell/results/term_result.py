@@ -32,7 +32,8 @@ class TermResult(Frozen):
         log_factor: logarithm of the Bayes factor.
         predicted: by how much better points are predicted from the others with it, in the logarithm of the
             density of their records; None where that was not asked.
-        rival: the term that it cannot be told from, and ``told_by`` what would tell, in words.
+        rival: the term that it cannot be told from.
+        told_by: the records that would tell, in words.
         unit: of its coefficients.
         values: coefficient of each joint or leg; None where it was not taken.
         sigma: one standard deviation of each.

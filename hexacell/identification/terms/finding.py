@@ -26,7 +26,8 @@ class TermFinding:
         log_factor: logarithm of the Bayes factor, beside the terms that were taken before it.
         predicted: by how much the logarithm of the density of points' records, predicted from all other
             points, is higher with it; NaN where that was not asked.
-        rival: the term that it cannot be told from, and ``told_by`` what would tell, in words.
+        rival: the term that it cannot be told from.
+        told_by: the records that would tell, in words.
     """
 
     name: str

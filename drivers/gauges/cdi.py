@@ -11,20 +11,13 @@ from enum import IntEnum
 from functools import partial
 
 from drivers.errors import GaugeAtEnd, GaugeSilent
-from drivers.gauges.protocol import (
-    DisplayedValue,
-    FrameRejected,
-    GaugeState,
-    LineSettings,
-    ProtocolSpec,
-    Unit,
-)
+from drivers.gauges import protocol
 from drivers.gauges.serial_gauge import SerialGauge
 
 VALUE_FRAME = re.compile(rb"([+-])(?=.{8}, )( *\d+\.\d+ *), (IN|MM)\r")
 PARAMETER = re.compile(rb"(?:[pP](\d{3}) ?= ?)?(\d{1,3})\r")
-UNITS = {b"IN": Unit.INCH, b"MM": Unit.MM}
-UNIT_NUMBERS = {1: Unit.INCH, 2: Unit.MM}
+UNITS = {b"IN": protocol.Unit.INCH, b"MM": protocol.Unit.MM}
+UNIT_NUMBERS = {1: protocol.Unit.INCH, 2: protocol.Unit.MM}
 MODES = {0: "ABS", 1: "TIR", 2: "INCR"}
 OUT_OF_BOUNDS = b"OUT OF BOUNDS\r"
 UNKNOWN_PARAMETER = (b"NOT FOUND\r", b"NO ACCESS\r")
@@ -50,33 +43,35 @@ def parse_parameter(frame: bytes, parameter: Parameter) -> int | None:
         return None
     match = PARAMETER.fullmatch(frame)
     if match is None or int(match[1] or parameter) != parameter:
-        raise FrameRejected(frame)
+        raise protocol.FrameRejected(frame)
     return int(match[2])
 
 
 class CdiGauge(SerialGauge):
     """A CDI or Starrett dial indicator."""
 
-    spec = ProtocolSpec("cdi", "CDI or Starrett indicator", LineSettings(9600), "+  2.1380, MM\r\n")
+    spec = protocol.ProtocolSpec(
+        "cdi", "CDI or Starrett indicator", protocol.LineSettings(9600), "+  2.1380, MM\r\n"
+    )
     normal_modes = frozenset({"ABS", "INCR"})
     value_request = b"R\r"
 
     _knows_parameters: bool | None = None
 
-    def _parse_value(self, frame: bytes) -> DisplayedValue:
+    def _parse_value(self, frame: bytes) -> protocol.DisplayedValue:
         if match := VALUE_FRAME.fullmatch(frame):
-            return DisplayedValue.of(match[1], match[2], frame, UNITS[match[3]])
+            return protocol.DisplayedValue.of(match[1], match[2], frame, UNITS[match[3]])
         if frame == OUT_OF_BOUNDS:
             raise self._at_end("plunger at its end (OUT OF BOUNDS)")
-        raise FrameRejected(frame)  # also another error: the request was garbled
+        raise protocol.FrameRejected(frame)  # also another error: the request was garbled
 
-    async def _read_state(self) -> GaugeState:
+    async def _read_state(self) -> protocol.GaugeState:
         try:
-            unit: Unit | None = (await self._read_value()).unit
+            unit: protocol.Unit | None = (await self._read_value()).unit
         except GaugeAtEnd:
             unit = UNIT_NUMBERS.get(await self._parameter(Parameter.UNIT) or 0)
         mode = await self._parameter(Parameter.MODE)
-        return GaugeState(
+        return protocol.GaugeState(
             unit=unit,
             mode=None if mode is None else MODES.get(mode, str(mode)),
             reversed=_flag(await self._parameter(Parameter.REVERSED)),

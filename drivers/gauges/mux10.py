@@ -12,14 +12,7 @@ import re
 from contextlib import suppress
 
 from drivers.errors import EmptyChannel, GaugeAtEnd, GaugeSilent, WrongAnswer
-from drivers.gauges.protocol import (
-    DisplayedValue,
-    FrameRejected,
-    GaugeState,
-    LineSettings,
-    Probe,
-    ProtocolSpec,
-)
+from drivers.gauges import protocol
 from drivers.gauges.serial_gauge import SerialGauge
 from drivers.interfaces import GaugeReading
 from drivers.serial.shared_port import SharedSerialPorts
@@ -47,15 +40,17 @@ def parse_identification(frame: bytes) -> str:
     """
     match = IDENTIFICATION_FRAME.fullmatch(frame)
     if match is None or VALUE_FRAME.fullmatch(frame):
-        raise FrameRejected(frame)
+        raise protocol.FrameRejected(frame)
     return match[1].decode("ascii").strip()
 
 
 class Mux10Gauge(SerialGauge):
     """A dial indicator on one channel of a Mitutoyo MUX-10 or a multiplexer with its format."""
 
-    spec = ProtocolSpec("mux10", "Mitutoyo MUX-10 channel", LineSettings(9600), "01A+0000.123\r", 5)
-    probe = Probe((19200, 4800, 2400, 38400, 57600, 115200))
+    spec = protocol.ProtocolSpec(
+        "mux10", "Mitutoyo MUX-10 channel", protocol.LineSettings(9600), "01A+0000.123\r", 5
+    )
+    probe = protocol.Probe((19200, 4800, 2400, 38400, 57600, 115200))
     has_channels = True
     busy_pause_s = 0.05
 
@@ -70,7 +65,7 @@ class Mux10Gauge(SerialGauge):
         except MultiplexerBusy:
             raise self._error(WrongAnswer, "its multiplexer is busy (918)", BUSY_ACTION) from None
 
-    async def _read_value(self) -> DisplayedValue:
+    async def _read_value(self) -> protocol.DisplayedValue:
         for _ in range(BUSY_TRIES):
             try:
                 return await super()._read_value()
@@ -78,13 +73,13 @@ class Mux10Gauge(SerialGauge):
                 await asyncio.sleep(self.busy_pause_s)
         raise self._error(DeviceError, "its multiplexer stays busy (918)", BUSY_ACTION)
 
-    def _parse_value(self, frame: bytes) -> DisplayedValue:
+    def _parse_value(self, frame: bytes) -> protocol.DisplayedValue:
         value = VALUE_FRAME.fullmatch(frame)
         if value and int(value[1]) == self.channel:
-            return DisplayedValue.of(value[2], value[3], frame)
+            return protocol.DisplayedValue.of(value[2], value[3], frame)
         error = ERROR_FRAME.fullmatch(frame)
         if error is None or int(error[1]) not in {1, self.channel}:
-            raise FrameRejected(frame)
+            raise protocol.FrameRejected(frame)
         code, displayed = int(error[2]), frame.decode("ascii").strip()
         if code == BUSY:
             raise MultiplexerBusy
@@ -93,8 +88,8 @@ class Mux10Gauge(SerialGauge):
             raise self._error(EmptyChannel, f"does not answer its multiplexer ({displayed})", action)
         raise self._at_end(f"shows an error instead of a value ({displayed}), as at an end of its travel")
 
-    async def _read_state(self) -> GaugeState:
-        displayed: DisplayedValue | None = None
+    async def _read_state(self) -> protocol.GaugeState:
+        displayed: protocol.DisplayedValue | None = None
         with suppress(GaugeAtEnd):
             displayed = await self._read_value()
         identification: str | None = None
@@ -104,5 +99,5 @@ class Mux10Gauge(SerialGauge):
             with suppress(GaugeSilent, WrongAnswer):
                 identification = await self._query(b"V\r", parse_identification)
         if displayed is None:
-            return GaugeState(identification)
-        return GaugeState(identification, displayed.unit, displayed.decimals)
+            return protocol.GaugeState(identification)
+        return protocol.GaugeState(identification, displayed.unit, displayed.decimals)

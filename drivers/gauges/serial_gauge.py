@@ -9,17 +9,7 @@ from dataclasses import asdict
 from typing import ClassVar, TypeVar
 
 from drivers.errors import GaugeAtEnd, GaugeSilent, GaugeUnsteady, WrongAnswer, WrongSetting, ZeroVoid
-from drivers.gauges.protocol import (
-    TERMINATOR,
-    DisplayedValue,
-    DisplayHistory,
-    FrameRejected,
-    GaugeState,
-    ImplausibleValue,
-    Probe,
-    ProtocolSpec,
-    Unit,
-)
+from drivers.gauges import protocol
 from drivers.interfaces import DeviceIdentity, GaugeReading
 from drivers.serial.opening import adapter_at
 from drivers.serial.port import SerialPort
@@ -60,12 +50,12 @@ class SerialGauge(ABC):
         channel: the input of a shared multiplexer; None if the gauge uses the line alone.
     """
 
-    spec: ClassVar[ProtocolSpec]
-    probe: ClassVar[Probe | None] = Probe()
+    spec: ClassVar[protocol.ProtocolSpec]
+    probe: ClassVar[protocol.Probe | None] = protocol.Probe()
     has_channels: ClassVar[bool] = False
     normal_modes: ClassVar[frozenset[str]] = frozenset()
     value_request: bytes
-    terminator: bytes = TERMINATOR
+    terminator: bytes = protocol.TERMINATOR
     verb: str = "answers"
     answer_check: str = "protocol"
     silence_check: str = "protocol"
@@ -79,10 +69,10 @@ class SerialGauge(ABC):
         self._ports = ports
         self._port: SharedSerialPort | None = None
         self._session = 0
-        self._state: GaugeState | None = None
+        self._state: protocol.GaugeState | None = None
         self._void: ZeroVoid | None = None
         self._last_frame = b""
-        self._history = DisplayHistory(settings)
+        self._history = protocol.DisplayHistory(settings)
 
     @property
     def name(self) -> str:
@@ -90,11 +80,11 @@ class SerialGauge(ABC):
         return self.settings.name
 
     @abstractmethod
-    def _parse_value(self, frame: bytes) -> DisplayedValue:
+    def _parse_value(self, frame: bytes) -> protocol.DisplayedValue:
         """The value in the answer; raises FrameRejected or a DeviceError."""
 
     @abstractmethod
-    async def _read_state(self) -> GaugeState:
+    async def _read_state(self) -> protocol.GaugeState:
         """Query the settings of the instrument."""
 
     async def open(self) -> DeviceIdentity:
@@ -153,7 +143,7 @@ class SerialGauge(ABC):
         self._opened_state()
         try:
             shown = self._plausible(await self._ask(self.value_request))
-        except FrameRejected as rejection:
+        except protocol.FrameRejected as rejection:
             self._require_silence()
             raise self._rejected([rejection]) from rejection
         return GaugeReading(shown.value, shown.text)
@@ -194,10 +184,10 @@ class SerialGauge(ABC):
             raise FileError(problem, subject=self.subject, action=f"Add {example} to the gauge")
         return section
 
-    async def _read_value(self) -> DisplayedValue:
+    async def _read_value(self) -> protocol.DisplayedValue:
         return await self._query(self.value_request, self._plausible)
 
-    def _plausible(self, frame: bytes) -> DisplayedValue:
+    def _plausible(self, frame: bytes) -> protocol.DisplayedValue:
         """The value in an answer, which is in mm and fits to those before; raises as ``_parse_value``."""
         shown = self._parse_value(frame)
         set_to = None if self._state is None else self._state.unit
@@ -205,20 +195,20 @@ class SerialGauge(ABC):
             raise self._error(WrongSetting, *INCH)
         if reason := self._history.other_decimals(shown):
             action = "Press its in/mm key, or correct resolution_mm in the cell file"
-            raise ImplausibleValue(frame, self._error(WrongSetting, reason, action))
+            raise protocol.ImplausibleValue(frame, self._error(WrongSetting, reason, action))
         if reason := self._history.beyond_travel(shown):
             action = "Check its cable and its unit; if its zero or preset key was pressed, open it again"
-            raise ImplausibleValue(frame, self._error(WrongAnswer, reason, action))
+            raise protocol.ImplausibleValue(frame, self._error(WrongAnswer, reason, action))
         self._history.keep_decimals(shown)
         return shown
 
     async def _query(self, request: bytes, parse: Callable[[bytes], Parsed]) -> Parsed:
         """The parsed answer; the request is repeated if ``parse`` rejects the frame."""
-        rejected: list[FrameRejected] = []
+        rejected: list[protocol.FrameRejected] = []
         while len(rejected) < MAX_REQUESTS or self._is_restarting():
             try:
                 return parse(await self._ask(request))
-            except FrameRejected as rejection:
+            except protocol.FrameRejected as rejection:
                 rejected.append(rejection)
                 self._require_silence()
         raise self._rejected(rejected)
@@ -238,7 +228,7 @@ class SerialGauge(ABC):
         except NoAnswer as missing:
             is_lone_line_end = bool(missing.beside_echo) and not missing.is_echoed  # the answer was lost
             if missing.beside_echo.strip() or is_lone_line_end:
-                raise FrameRejected(missing.beside_echo) from missing
+                raise protocol.FrameRejected(missing.beside_echo) from missing
             self._log.warning("no answer to %r within %g s", request, self.settings.timeout_s)
             raise self._silent(port, is_echoed=missing.is_echoed) from missing
         port.note_answer(self.name)
@@ -269,28 +259,30 @@ class SerialGauge(ABC):
     def _require_silence(self) -> None:
         self._open_port().require_silence()
 
-    def _rejected(self, rejections: Sequence[FrameRejected]) -> DeviceError:
+    def _rejected(self, rejections: Sequence[protocol.FrameRejected]) -> DeviceError:
         """The error for a request whose answers were all rejected: what most of them say.
 
         A damaged digit looks like another resolution once; an instrument in inches does so each time.
         """
         self._log.warning("rejected: %s", ", ".join(repr(one.frame) for one in rejections))
-        implausible = [one for one in rejections if isinstance(one, ImplausibleValue)]
+        implausible = [one for one in rejections if isinstance(one, protocol.ImplausibleValue)]
         if 2 * len(implausible) > len(rejections):
             return implausible[-1].error
         return self._garbled(next(one.frame for one in reversed(rejections) if one not in implausible))
 
     def _garbled(self, received: bytes) -> DeviceError:
         """The error for repeated answers that are no frames of the protocol."""
-        protocol, came = self.spec.protocol, f"{self.verb} {quoted(received)}"
-        usual = f"{protocol} uses {self.spec.line}"
+        name, came = self.spec.protocol, f"{self.verb} {quoted(received)}"
+        usual = f"{name} uses {self.spec.line}"
         if found := what_is_wrong_with(received, self.terminator, usual):
             return self._error(WrongAnswer, f"{came}, {found[0]}", found[1])
-        problem = f"{came} where protocol {protocol} has answers like {self.spec.example!r}"
+        problem = f"{came} where protocol {name} has answers like {self.spec.example!r}"
         action = f"Correct {self.answer_check} or port in the cell file; `hexacell devices` tries all"
         return self._error(WrongAnswer, problem, action)
 
-    async def _confirmed(self, state: GaugeState, before: GaugeState | None = None) -> GaugeState:
+    async def _confirmed(
+        self, state: protocol.GaugeState, before: protocol.GaugeState | None = None
+    ) -> protocol.GaugeState:
         """The state, asked again while it is unusable or not as before: a damaged answer is no setting."""
         for _ in range(MORE_STATES):
             if not (self._unusable(state) or (before and state.changes_since(before))):
@@ -300,11 +292,11 @@ class SerialGauge(ABC):
             raise error
         return state
 
-    def _unusable(self, state: GaugeState) -> WrongSetting | None:
+    def _unusable(self, state: protocol.GaugeState) -> WrongSetting | None:
         """Why readings in these settings are wrong; None if they are right."""
         is_odd_mode = state.mode is not None and state.mode not in self.normal_modes
         checks = (
-            (state.unit is Unit.INCH, *INCH),
+            (state.unit is protocol.Unit.INCH, *INCH),
             (state.hold, "is on hold, its value is frozen", "Release hold"),
             (is_odd_mode, f"is in mode {state.mode}", "Set it to normal measuring"),
             (state.scaling, "multiplies what it measures", "Switch its ratio off"),
@@ -325,7 +317,7 @@ class SerialGauge(ABC):
     def _at_end(self, problem: str) -> GaugeAtEnd:
         return self._error(GaugeAtEnd, problem, "Move the gauge or the ball")
 
-    def _opened_state(self) -> GaugeState:
+    def _opened_state(self) -> protocol.GaugeState:
         self._open_port()
         if self._state is None:
             raise self._error(DeviceError, "is not open")
@@ -347,9 +339,9 @@ class ValueOnlyGauge(SerialGauge):
     Its unit, where the value names it, and its decimals are all that can be checked.
     """
 
-    async def _read_state(self) -> GaugeState:
+    async def _read_state(self) -> protocol.GaugeState:
         try:
             shown = await self._read_value()
         except GaugeAtEnd:
-            return GaugeState()
-        return GaugeState(unit=shown.unit, decimals=shown.decimals)
+            return protocol.GaugeState()
+        return protocol.GaugeState(unit=shown.unit, decimals=shown.decimals)

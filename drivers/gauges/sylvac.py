@@ -11,14 +11,7 @@ import re
 from dataclasses import dataclass
 
 from drivers.errors import WrongAnswer
-from drivers.gauges.protocol import (
-    DisplayedValue,
-    FrameRejected,
-    GaugeState,
-    LineSettings,
-    ProtocolSpec,
-    Unit,
-)
+from drivers.gauges import protocol
 from drivers.gauges.serial_gauge import SerialGauge
 from hexacell.errors import DeviceError
 
@@ -46,7 +39,7 @@ class Query:
             return None
         match = self.answer.fullmatch(frame)
         if match is None or frame in ERROR_FRAMES:
-            raise FrameRejected(frame)
+            raise protocol.FrameRejected(frame)
         return match[1].decode("ascii").strip()
 
 
@@ -63,30 +56,34 @@ class SylvacGauge(SerialGauge):
     """A dial indicator that speaks Sylvac's opto-RS duplex protocol."""
 
     # duplex cables are powered by DTR high and RTS low
-    spec = ProtocolSpec(
-        "sylvac", "Sylvac opto-RS indicator", LineSettings(4800, 7, "E", 2, rts=False), "+12.345\r", 5
+    spec = protocol.ProtocolSpec(
+        "sylvac",
+        "Sylvac opto-RS indicator",
+        protocol.LineSettings(4800, 7, "E", 2, rts=False),
+        "+12.345\r",
+        5,
     )
     normal_modes = frozenset({"NOR", "REF", "REF1", "REF2"})
     value_request = b"?\r"
 
     _previous = (b"", b"")
 
-    def _parse_value(self, frame: bytes) -> DisplayedValue:
+    def _parse_value(self, frame: bytes) -> protocol.DisplayedValue:
         if match := VALUE_FRAME.fullmatch(frame):
-            return DisplayedValue.of(match[1], match[2], frame)
+            return protocol.DisplayedValue.of(match[1], match[2], frame)
         if frame == RANGE:
             raise self._at_end("plunger at its end (ERR3)")
         if frame == SENSOR:
             raise self._voided("moved too fast or its sensor fails (ERR0)")
-        raise FrameRejected(frame)  # also another error: the request was garbled
+        raise protocol.FrameRejected(frame)  # also another error: the request was garbled
 
-    async def _read_state(self) -> GaugeState:
+    async def _read_state(self) -> protocol.GaugeState:
         unit = await self._setting(UNIT)
         if unit is None:
             raise self._error(DeviceError, "does not report its unit", "Use an indicator that knows UNI?")
         direction = await self._setting(DIRECTION)
-        return GaugeState(
-            unit=Unit.MM if unit == "MM" else Unit.INCH,
+        return protocol.GaugeState(
+            unit=protocol.Unit.MM if unit == "MM" else protocol.Unit.INCH,
             identification=await self._setting(IDENTIFICATION),
             mode=await self._setting(MODE),
             hold=_flag(await self._setting(HOLD), "1"),
@@ -103,7 +100,7 @@ class SylvacGauge(SerialGauge):
         frame = await super()._ask(request)
         self._previous = (request, frame)
         if before == (IDENTIFICATION.command, frame) and frame not in ERROR_FRAMES:
-            raise FrameRejected(frame)  # the answer before came once more
+            raise protocol.FrameRejected(frame)  # the answer before came once more
         unsolicited = self._open_port().take_unsolicited()
         unsolicited += frame if request != IDENTIFICATION.command else b""
         if power_up := POWER_UP.search(unsolicited):

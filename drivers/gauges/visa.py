@@ -12,15 +12,7 @@ from functools import partial
 from typing import Any
 
 from drivers.errors import PortLost, WrongSetting, optional
-from drivers.gauges.protocol import (
-    DisplayedValue,
-    FrameRejected,
-    GaugeState,
-    LineSettings,
-    ProtocolSpec,
-    Unit,
-    decimals_of,
-)
+from drivers.gauges import protocol
 from drivers.gauges.serial_gauge import SerialGauge
 from drivers.serial.opening import lost_port
 from drivers.serial.port import SerialPort
@@ -127,7 +119,9 @@ class VisaPort(RequestPort):
 class VisaGauge(SerialGauge):
     """A length that an instrument with SCPI measures."""
 
-    spec = ProtocolSpec("visa", "instrument with SCPI", LineSettings(9600), "+1.23450000E-03\n")
+    spec = protocol.ProtocolSpec(
+        "visa", "instrument with SCPI", protocol.LineSettings(9600), "+1.23450000E-03\n"
+    )
     probe = None
     terminator = b"\n"
     silence_check = "ask with its line_end"
@@ -142,34 +136,36 @@ class VisaGauge(SerialGauge):
         self._line_end = self._visa.line_end.encode("latin-1")
         self.terminator = self._line_end[-1:]
         self.value_request = self._visa.question(settings.channel).encode("latin-1") + self._line_end
-        self._decimals = decimals_of(settings.resolution_mm or 0.001)
+        self._decimals = protocol.decimals_of(settings.resolution_mm or 0.001)
 
     def _line_settings(self) -> dict[str, object]:
         is_stream = self.port_factory is SerialPort
         return super()._line_settings() if is_stream else {"backend": self._visa.backend}
 
-    def _parse_value(self, frame: bytes) -> DisplayedValue:
+    def _parse_value(self, frame: bytes) -> protocol.DisplayedValue:
         text = frame.strip().decode("latin-1")
         if not NUMBER.fullmatch(text):
-            raise FrameRejected(frame)
+            raise protocol.FrameRejected(frame)
         number = float(text)
         if abs(number) == NO_NUMBER:
             raise self._error(DeviceError, f"has no value ({text})", "Look at its display")
         if abs(number) >= INFINITE:
             raise self._at_end(f"is out of its range ({text})")
-        return DisplayedValue(number * self._visa.mm_per_unit, self._decimals, Unit.MM, text)
+        return protocol.DisplayedValue(
+            number * self._visa.mm_per_unit, self._decimals, protocol.Unit.MM, text
+        )
 
-    async def _read_state(self) -> GaugeState:
+    async def _read_state(self) -> protocol.GaugeState:
         asked = IDENTIFY + self._line_end
         identification = await self._query(asked, _text) if self._visa.identify else None
         for question, expected in self._visa.expect.items():
             query = question.encode("latin-1") + self._line_end
             answer = await self._query(query, partial(_setting, expected))
             if answer != expected:
-                return GaugeState(identification, mode=f"{question} {answer}, not {expected}")
-        return GaugeState(identification)
+                return protocol.GaugeState(identification, mode=f"{question} {answer}, not {expected}")
+        return protocol.GaugeState(identification)
 
-    def _unusable(self, state: GaugeState) -> WrongSetting | None:
+    def _unusable(self, state: protocol.GaugeState) -> WrongSetting | None:
         if state.mode is None:
             return None
         action = "Set the instrument, or correct expect in the cell file"
@@ -179,7 +175,7 @@ class VisaGauge(SerialGauge):
 def _text(frame: bytes) -> str:
     text = frame.strip()
     if not TEXT.fullmatch(text):
-        raise FrameRejected(frame)
+        raise protocol.FrameRejected(frame)
     return text.decode("ascii")
 
 

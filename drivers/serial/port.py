@@ -12,24 +12,7 @@ from math import inf
 
 import serial
 
-from drivers.serial.opening import (
-    SLICE_S,
-    close_port,
-    have_terminal_check,
-    in_software,
-    lost_port,
-    opened_port,
-    sent,
-)
-from drivers.serial.request_port import (
-    FRAME_LIMIT,
-    LINE_ENDS,
-    FrameLog,
-    NoAnswer,
-    RequestPort,
-    cut_frame,
-    is_copies,
-)
+from drivers.serial import opening, request_port
 from drivers.wire_trace import TrafficDirection
 from hexacell.clock import Patience
 from hexacell.errors import DeviceError
@@ -41,7 +24,7 @@ CAREFUL_EXCHANGES = 20  # after bytes that nobody asked for, so many wait whethe
 EXCHANGE_TRIES = 3
 
 
-class SerialPort(RequestPort):
+class SerialPort(request_port.RequestPort):
     """One serial port: requests and their responses, kept synchronized.
 
     A late response must never be taken for that of the next request. After a time-out, therefore, the
@@ -56,13 +39,13 @@ class SerialPort(RequestPort):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._parity = in_software(self._settings)
+        self._parity = opening.in_software(self._settings)
         self._port: serial.Serial | None = None
         self._last_traffic = 0.0
         self._silence_s = 0.0
         self._surplus = self._last_frame = b""
         self._careful = 0
-        self.log = FrameLog(self._settings.pop("frame_end", None))
+        self.log = request_port.FrameLog(self._settings.pop("frame_end", None))
         self._empty_at = -inf
 
     def open(self) -> int:
@@ -70,8 +53,8 @@ class SerialPort(RequestPort):
         if self._port is not None and not self._is_alive(self._port):
             self.close()
         if self._port is None:
-            self._port = opened_port(self.url, self._settings, self.subject, self.closing)
-            have_terminal_check(self._port, self._settings)
+            self._port = opening.opened_port(self.url, self._settings, self.subject, self.closing)
+            opening.have_terminal_check(self._port, self._settings)
             self._opened()
             self._silence_s, self._surplus, self._last_frame, self._careful = 0.0, b"", b"", 0
             self._empty_at = -inf
@@ -80,7 +63,7 @@ class SerialPort(RequestPort):
     def _exchange_once(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
         """The first complete frame; after ``NoAnswer`` the next request waits for late responses."""
         if self._port is None:
-            raise lost_port(self.subject, self.url, "it is not open")
+            raise opening.lost_port(self.subject, self.url, "it is not open")
         with self._port_errors():
             for _ in range(EXCHANGE_TRIES):
                 self._resynchronise(self._port)
@@ -97,7 +80,7 @@ class SerialPort(RequestPort):
             DeviceError: The port is not open, was lost, or is being closed.
         """
         if self._port is None:
-            raise lost_port(self.subject, self.url, "it is not open")
+            raise opening.lost_port(self.subject, self.url, "it is not open")
         with self._port_errors():
             if not self._port.in_waiting:
                 self._empty_at = self.now()
@@ -110,7 +93,7 @@ class SerialPort(RequestPort):
     def close(self) -> None:
         """Close the port; closing twice is harmless."""
         if self._port is not None:
-            close_port(self._port)
+            opening.close_port(self._port)
             self._port = None
 
     def _is_alive(self, port: serial.Serial) -> bool:
@@ -127,13 +110,13 @@ class SerialPort(RequestPort):
         surplus, self._surplus = self._surplus, b""
         self._require_silence_after(surplus)
         longest_s = SILENCE_ATTEMPTS * max(self._silence_s, FRAME_GAP_S)
-        patience = Patience(longest_s, SLICE_S, time.monotonic())
+        patience = Patience(longest_s, opening.SLICE_S, time.monotonic())
         while time.monotonic() - self._last_traffic < self._silence_s or port.in_waiting:
             if patience.left_s(time.monotonic()) < 0.0:
                 raise self._not_silent()
             surplus += self._read(port)
             self._require_silence_after(surplus)
-        if surplus.strip(LINE_ENDS):
+        if surplus.strip(request_port.LINE_ENDS):
             self.surplus_count += 1
         self._keep_unsolicited(surplus)
         self._silence_s = 0.0
@@ -145,31 +128,31 @@ class SerialPort(RequestPort):
         while time.monotonic() - self._last_traffic < FRAME_GAP_S and time.monotonic() < deadline:
             surplus += self._read(port)
         self._keep_unsolicited(surplus)
-        if not surplus.strip(LINE_ENDS):
+        if not surplus.strip(request_port.LINE_ENDS):
             self._careful -= 1
-        return is_copies(surplus, frame)
+        return request_port.is_copies(surplus, frame)
 
     def _require_silence_after(self, surplus: bytes) -> None:
-        if surplus.strip(LINE_ENDS):
+        if surplus.strip(request_port.LINE_ENDS):
             self.require_silence()
 
     def _keep_unsolicited(self, surplus: bytes) -> None:
-        if not surplus.strip(LINE_ENDS):
+        if not surplus.strip(request_port.LINE_ENDS):
             return
         self.require_silence()
         self._careful = CAREFUL_EXCHANGES
-        if not is_copies(surplus, self._last_frame):
+        if not request_port.is_copies(surplus, self._last_frame):
             self.unsolicited.append(surplus)
 
     def _frame(self, port: serial.Serial, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
-        received, patience = b"", Patience(timeout_s, SLICE_S, self._asked_at)
-        while len(received) <= FRAME_LIMIT and patience.left_s(time.monotonic()) > 0.0:
+        received, patience = b"", Patience(timeout_s, opening.SLICE_S, self._asked_at)
+        while len(received) <= request_port.FRAME_LIMIT and patience.left_s(time.monotonic()) > 0.0:
             received += self._read(port)
-            if cut := cut_frame(received, request, terminator):
+            if cut := request_port.cut_frame(received, request, terminator):
                 self._last_frame, self._surplus = cut
                 return self._last_frame
         self._silence_s = self.worst_latency_s
-        raise NoAnswer(received, request)
+        raise request_port.NoAnswer(received, request)
 
     def _read(self, port: serial.Serial) -> bytes:
         """The bytes that come within one slice, possibly none."""
@@ -187,7 +170,7 @@ class SerialPort(RequestPort):
         request = request if self._parity is None else self._parity.encode(request)
         self._record(TrafficDirection.SENT, request)
         self._last_traffic = self._asked_at
-        sent(port.write, request)
+        opening.sent(port.write, request)
 
     @contextmanager
     def _port_errors(self) -> Iterator[None]:
@@ -195,7 +178,7 @@ class SerialPort(RequestPort):
             yield
         except (OSError, termios.error) as error:
             self.close()
-            raise lost_port(self.subject, self.url, str(error)) from error
+            raise opening.lost_port(self.subject, self.url, str(error)) from error
 
     def _not_silent(self) -> DeviceError:
         return DeviceError(

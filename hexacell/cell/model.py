@@ -7,7 +7,7 @@ from typing import Literal, Self, TypeVar
 from pydantic import Field, ValidationError, ValidationInfo, field_validator, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from hexacell.cell import measuring
+from hexacell.cell import measuring, operation
 from hexacell.cell.devices import EncoderSettings, GaugeSettings, ThermometerSettings
 from hexacell.cell.fields import CertificateSettings, Name, Section, broken_rule, key
 from hexacell.cell.limits import (
@@ -16,14 +16,6 @@ from hexacell.cell.limits import (
     LimitSettings,
     MotionSettings,
     SpeedSettings,
-)
-from hexacell.cell.operation import (
-    MOST_NOTIFICATIONS,
-    ArchiveSettings,
-    NotificationSettings,
-    OpcUaSettings,
-    ReportSettings,
-    UnattendedSettings,
 )
 from hexacell.cell.recovery import RecoverySettings
 from hexacell.cell.robot import ControllerSettings, RobotSettings
@@ -40,7 +32,9 @@ MOST_THERMOMETERS = 100
 FEWEST_POINTS = 2
 """Fewest points to measure: one alone does not identify the geometry."""
 
-Named = TypeVar("Named", bound="tuple[GaugeSettings | ThermometerSettings | NotificationSettings, ...]")
+Named = TypeVar(
+    "Named", bound="tuple[GaugeSettings | ThermometerSettings | operation.NotificationSettings, ...]"
+)
 
 Refusals = Iterator[tuple[KeyPath, PydanticCustomError]]
 
@@ -77,12 +71,14 @@ class CellSettings(Section):
     quick: measuring.QuickSettings = measuring.QuickSettings()
     length_check: LengthCheckSettings | None = None
     recovery: RecoverySettings = RecoverySettings()
-    unattended: UnattendedSettings = UnattendedSettings()
-    archive: ArchiveSettings = ArchiveSettings()
-    notifications: tuple[NotificationSettings, ...] = Field((), max_length=MOST_NOTIFICATIONS)
-    opcua: OpcUaSettings | None = None
+    unattended: operation.UnattendedSettings = operation.UnattendedSettings()
+    archive: operation.ArchiveSettings = operation.ArchiveSettings()
+    notifications: tuple[operation.NotificationSettings, ...] = Field(
+        (), max_length=operation.MOST_NOTIFICATIONS
+    )
+    opcua: operation.OpcUaSettings | None = None
     task: measuring.TaskSettings = measuring.TaskSettings()
-    report: ReportSettings = ReportSettings()
+    report: operation.ReportSettings = operation.ReportSettings()
     simulation: SimulationSettings | None = None
 
     @property

@@ -17,14 +17,7 @@ from hexacell.identification.data_faults.stepwise_selection import (
 )
 from hexacell.identification.data_faults.units import wrong_unit
 from hexacell.identification.problem.problem import LEAST_SPARE_EQUATIONS, Problem
-from hexacell.identification.solver.fit import (
-    COARSE,
-    INCREMENTAL,
-    QUICK,
-    SolverOptions,
-    fit_regularized,
-    solve_around_singularities,
-)
+from hexacell.identification.solver import fit
 from hexacell.identification.solver.result import GaugeFaultError, Identification
 from hexacell.identification.terms.finding import Finding, TermFinding
 from hexacell.identification.terms.term import ModelTerm
@@ -78,12 +71,12 @@ def _without_faults(problem: Problem) -> tuple[Selection, tuple[TermFinding, ...
     """
     if problem.terms is not None:  # known before: linearized once more where the robot is
         known = (TermFinding(term.name, Finding.KNOWN, 0.0) for term in problem.terms.terms)
-        return select_faults(with_terms_of(problem, fit_regularized(problem))), tuple(known)
+        return select_faults(with_terms_of(problem, fit.fit_regularized(problem))), tuple(known)
     unknowns = len(problem.prior.covariance) + LEGS * len(problem.offered) + LEAST_SPARE_EQUATIONS
     if not problem.offered or problem.equations < unknowns:
         return select_faults(problem), ()
-    quick = fit_regularized(problem, QUICK)
-    first = quick if quick.converged else fit_regularized(problem)
+    quick = fit.fit_regularized(problem, fit.QUICK)
+    first = quick if quick.converged else fit.fit_regularized(problem)
     chosen = choose_terms(first)
     if any(one.log_factor > 0.0 for one in chosen.findings):
         # What they do is linearized where they do not bend the geometry.
@@ -106,8 +99,8 @@ def _without_faults(problem: Problem) -> tuple[Selection, tuple[TermFinding, ...
 
 def _fitted_with(terms: tuple[ModelTerm, ...], problem: Problem, first: Identification) -> Identification:
     """The fit with terms, linearized where a fit with them is, from one without."""
-    nearly = fit_regularized(problem.started_at(first.free).with_terms(terms))
-    return fit_regularized(with_terms_of(problem, nearly))
+    nearly = fit.fit_regularized(problem.started_at(first.free).with_terms(terms))
+    return fit.fit_regularized(with_terms_of(problem, nearly))
 
 
 def with_terms_of(problem: Problem, found: Identification) -> Problem:
@@ -185,10 +178,10 @@ def _axis_and_missing(direction: Array) -> tuple[str, str]:
     return axis, f"{others} too"
 
 
-def estimate_online(problem: Problem, options: SolverOptions = COARSE) -> Identification:
+def estimate_online(problem: Problem, options: fit.SolverOptions = fit.COARSE) -> Identification:
     """Estimate the geometry from the records so far, with the full prior and without any check."""
     precision = problem.prior.precision
-    kept, solution = solve_around_singularities(problem, precision, options)
+    kept, solution = fit.solve_around_singularities(problem, precision, options)
     return Identification(kept, solution, precision)
 
 
@@ -207,6 +200,6 @@ def without_gross_errors(found: Identification) -> Iterator[Identification]:
         if ratio.max() <= 1.0 or not found.problem.subset(kept).is_overdetermined:
             return
         some = found.problem.starting_at(found.free, found.poses).subset(kept)
-        problem, solution = solve_around_singularities(some, found.active_prior, INCREMENTAL)
+        problem, solution = fit.solve_around_singularities(some, found.active_prior, fit.INCREMENTAL)
         found, rejected = Identification(problem, solution, found.active_prior), rejected + 1
         yield found

@@ -21,14 +21,9 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array, Mask
+from hexacell.noise import measured_noise
 from hexacell.noise.approach_scatter import RepeatedApproaches, ScatterSource, approach_scatter
 from hexacell.noise.ball_by_encoders import BallByEncoders
-from hexacell.noise.measured_noise import (
-    AveragingForecast,
-    InstrumentNoise,
-    MeasuredNoise,
-    averaging_seconds,
-)
 from hexacell.noise.standstill import SIGNIFICANCE, ReadingNoise, reading_noise
 
 INSTRUMENTS = 9
@@ -63,7 +58,7 @@ class NoiseReadings:
     window_readings: int
 
 
-def assess_noise(plan: Plan, readings: NoiseReadings) -> MeasuredNoise:
+def assess_noise(plan: Plan, readings: NoiseReadings) -> measured_noise.MeasuredNoise:
     """The noise of the records that a plan is carried out with from now on."""
     assessment, stated = _NoiseAssessment(plan, readings), plan.robot.noise
     sigmas = {windows: assessment.of_records(windows) for windows in WINDOWS}
@@ -75,7 +70,7 @@ def assess_noise(plan: Plan, readings: NoiseReadings) -> MeasuredNoise:
     forecasts = forecaster.forecasts(noise)
     windows = worthwhile_windows(forecasts, plan.settings.noise.averaged_windows)
     x, y, z, *encoders = assessment.instruments(windows)
-    return MeasuredNoise(
+    return measured_noise.MeasuredNoise(
         gauges=(x, y, z),
         encoders=tuple(encoders),
         approaches=assessment.scatter,
@@ -94,10 +89,10 @@ def visits_agree(plan: Plan, readings: NoiseReadings) -> bool:
 def assess_again(
     plan: Plan,
     readings: NoiseReadings,
-    measured: MeasuredNoise,
+    measured: measured_noise.MeasuredNoise,
     found: Identification,
     drifted_mm: float = 0.0,
-) -> MeasuredNoise:
+) -> measured_noise.MeasuredNoise:
     """The noise by the same readings, once the geometry is known by which the encoders move the ball.
 
     Near a singularity the drawing may be wrong by half in that. The records were taken as ``measured``. By
@@ -177,7 +172,7 @@ class _NoiseAssessment:
         each = zip(self.reading_noise, sigma.tolist(), strict=True)
         return np.array([noise.exceeds(mm, count, significance) for noise, mm in each])
 
-    def instruments(self, windows: int) -> Iterator[InstrumentNoise]:
+    def instruments(self, windows: int) -> Iterator[measured_noise.InstrumentNoise]:
         """The noise of each, in records that are means of some windows."""
         records = self.of_records(windows)
         gauges = sorted(self.plan.settings.gauges, key=lambda gauge: gauge.axis)
@@ -185,7 +180,7 @@ class _NoiseAssessment:
         units = [JointUnit.MM] * 3 + [self.plan.robot.mechanism.words.joint_unit] * 6
         larger = self._readings_exceed(self.stated)
         for row, (name, unit) in enumerate(zip(names, units, strict=True)):
-            yield InstrumentNoise(
+            yield measured_noise.InstrumentNoise(
                 name=name,
                 unit=unit,
                 stated=float(self.stated[row]),
@@ -201,15 +196,16 @@ class AveragingForecaster:
 
     plan: Plan
 
-    def forecasts(self, noise: Mapping[int, Noise]) -> tuple[AveragingForecast, ...]:
+    def forecasts(self, noise: Mapping[int, Noise]) -> tuple[measured_noise.AveragingForecast, ...]:
         """Errors by the noise of records of some windows each; empty where no accuracy is predicted."""
         errors = {windows: self.end_error(one) for windows, one in noise.items()}
         records = sum(self.plan.forecaster.planned(CampaignState()).values())
         minutes = {
-            windows: records * averaging_seconds(self.plan.settings, windows) / 60.0 for windows in noise
+            windows: records * measured_noise.averaging_seconds(self.plan.settings, windows) / 60.0
+            for windows in noise
         }
         return tuple(
-            AveragingForecast(windows=windows, error_mm=error, minutes=minutes[windows])
+            measured_noise.AveragingForecast(windows=windows, error_mm=error, minutes=minutes[windows])
             for windows, error in errors.items()
             if error is not None
         )
@@ -232,7 +228,7 @@ def mean_of_independent(noise: Noise, windows: int) -> Noise:
     return replace(noise, encoder=noise.encoder / windows**0.5, gauge_mm=noise.gauge_mm / windows**0.5)
 
 
-def worthwhile_windows(forecasts: tuple[AveragingForecast, ...], most: int) -> int:
+def worthwhile_windows(forecasts: tuple[measured_noise.AveragingForecast, ...], most: int) -> int:
     """How many windows to average: as many as pay, each number against the one before it."""
     best = 1
     for fewer, more in pairwise(forecasts):

@@ -11,14 +11,8 @@ from pydantic import Field
 
 from hexacell.cell.fields import Frozen, GeometryDocument
 from hexacell.identification.identified_zeros import IdentifiedZeros, ParameterChoice
+from hexacell.identification.solver import result
 from hexacell.identification.solver.chi_square import ChiSquareTest
-from hexacell.identification.solver.result import (
-    DataFault,
-    DataFaultKind,
-    GeometryEstimate,
-    Identification,
-    Termination,
-)
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import LEGS, ParameterSet
 from hexacell.kinematics.rotations import Array
@@ -35,15 +29,15 @@ class OutlierRecord(Frozen):
 
     point: int
     orientation: int
-    kind: DataFaultKind = DataFaultKind.GROSS_ERROR
+    kind: result.DataFaultKind = result.DataFaultKind.GROSS_ERROR
     gauges: tuple[str, ...] = ()
     off_mm: Deviation | None = None
 
     @classmethod
-    def of(cls, record: RecordId, fault: DataFault) -> Self:
+    def of(cls, record: RecordId, fault: result.DataFault) -> Self:
         """A record and its fault as an outlier; the gauges of a zero shift are in its finding only."""
         point, orientation = record
-        gauges = () if fault.kind is DataFaultKind.ZERO_SHIFT else tuple(fault.gauges)
+        gauges = () if fault.kind is result.DataFaultKind.ZERO_SHIFT else tuple(fault.gauges)
         return cls(
             point=point, orientation=orientation, kind=fault.kind, gauges=gauges, off_mm=fault.offset_mm
         )
@@ -61,7 +55,7 @@ class IdentificationResult(Frozen):
     """
 
     converged: bool
-    termination: Termination
+    termination: result.Termination
     iterations: int
     records: int
     points: int
@@ -81,7 +75,7 @@ class IdentificationResult(Frozen):
     holds_at_c: Temperatures = ()
 
     @classmethod
-    def of(cls, found: Identification, zeros: IdentifiedZeros | None = None) -> Self:
+    def of(cls, found: result.Identification, zeros: IdentifiedZeros | None = None) -> Self:
         """The result of an identification, or of the zeros alone."""
         parameters, kept = found.geometry.parameters, zeros or found
         holds_at = found.problem.holds_at
@@ -128,10 +122,10 @@ class IdentificationResult(Frozen):
             )
         ]
 
-    def estimate(self, parameters: ParameterSet) -> GeometryEstimate:
+    def estimate(self, parameters: ParameterSet) -> result.GeometryEstimate:
         """What the acceptance gates need."""
         covariance = np.array(self.covariance)
-        return GeometryEstimate(
+        return result.GeometryEstimate(
             self.identified(parameters), covariance, self.termination, self.undetermined
         )
 

@@ -31,18 +31,11 @@ from hexacell.results.result import IdentificationResult, LengthResult, legs_at
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.length_records import JudgedGeometry
+from hexacell.verdict import model_evidence
 from hexacell.verdict.correction_evidence import correction_test
 from hexacell.verdict.decision import Verdict, VerifiedAccuracy, worst_verdict
 from hexacell.verdict.either_side import places_on_either_side
 from hexacell.verdict.length_check import LengthMeasurements, LengthStatement, length_check, length_result
-from hexacell.verdict.model_evidence import (
-    ZEROS_DOUBTED,
-    ModelTest,
-    confirmed,
-    fails_narrowly,
-    model_tests,
-    with_zeros_doubted,
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +79,7 @@ class Verification(Frozen):
     """
 
     verdict: Verdict
-    tests: tuple[ModelTest, ...] = ()
+    tests: tuple[model_evidence.ModelTest, ...] = ()
     accuracy: VerifiedAccuracy | None = None
     before_mm: float | None = None
     after_mm: float | None = None
@@ -113,7 +106,7 @@ class Verification(Frozen):
     @property
     def needs_confirmation(self) -> bool:
         """Whether only confirming records can decide if the model is wrong, or chance made a test fail."""
-        return fails_narrowly(self.tests) and self.accuracy is not None and not self.is_worse
+        return model_evidence.fails_narrowly(self.tests) and self.accuracy is not None and not self.is_worse
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,12 +147,14 @@ def verify(settings: CellSettings, robot: Robot, found: Identification, held_out
     if before is None or after is None:
         return Verification(verdict=Verdict.NOT_EVALUATED)
     updated = update(found, robot.problem(held_out.records))
-    tests = model_tests(found, updated)
+    tests = model_evidence.model_tests(found, updated)
     if held_out.confirming is not None:
         updated = update(updated, robot.problem(held_out.confirming))
-        tests = confirmed(tests, updated, np.isin(updated.problem.labels[:, 0], held_out.confirming.points))
+        tests = model_evidence.confirmed(
+            tests, updated, np.isin(updated.problem.labels[:, 0], held_out.confirming.points)
+        )
     if settings.encoders.are_of_controller and settings.controller.joints_include_zeros:
-        tests = with_zeros_doubted(tests)
+        tests = model_evidence.with_zeros_doubted(tests)
     if (corrected := correction_test(robot, held_out.under_new)) is not None:
         tests = (*tests, corrected)
     belief = robot.belief(updated)
@@ -172,7 +167,7 @@ def verify(settings: CellSettings, robot: Robot, found: Identification, held_out
         sentence = "The records of the length check agree with each other."
         if not length.is_consistent:
             sentence = f"The length check says nothing: {length.reason}."
-        test = ModelTest(name="length check", passed=length.is_consistent, sentence=sentence)
+        test = model_evidence.ModelTest(name="length check", passed=length.is_consistent, sentence=sentence)
         tests = (*tests, test)
     noise = _noise_in_mm(robot, updated)
     worse = is_worse(before, after, noise)
@@ -251,7 +246,9 @@ def _rms(covariances: Array) -> float:
     return float(np.sqrt(np.mean(np.trace(covariances, axis1=1, axis2=2)) / 3.0))
 
 
-def _verdict(tests: Sequence[ModelTest], accuracy: VerifiedAccuracy | None, *, worse: bool) -> Verdict:
+def _verdict(
+    tests: Sequence[model_evidence.ModelTest], accuracy: VerifiedAccuracy | None, *, worse: bool
+) -> Verdict:
     if worse:
         return Verdict.FAIL
     if accuracy is None:
@@ -299,8 +296,8 @@ def reason_of(verified: Verification) -> str:
     """Why a verdict is not that of the error shown; empty where it is."""
     failed = [test.sentence for test in verified.tests if not test.passed]
     if verified.is_worse:
-        is_of_zeros = any(sentence.endswith(ZEROS_DOUBTED) for sentence in failed)
-        doubt = f"; {ZEROS_DOUBTED.rstrip('.')}" if is_of_zeros else ""
+        is_of_zeros = any(sentence.endswith(model_evidence.ZEROS_DOUBTED) for sentence in failed)
+        doubt = f"; {model_evidence.ZEROS_DOUBTED.rstrip('.')}" if is_of_zeros else ""
         return f"worse than before{doubt}"
     if verified.verdict is Verdict.NOT_EVALUATED and failed:
         return failed[0].rstrip(".")

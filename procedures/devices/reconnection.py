@@ -3,24 +3,20 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from drivers.errors import (
-    BusError,
-    ConnectionLost,
-    GaugeSilent,
-    PortLost,
-    RestartedNodeError,
-    SilentNodeError,
-    WrongAnswer,
-    WrongSetting,
-    ZeroVoid,
-)
+from drivers import errors
 from drivers.interfaces import DeviceIdentity
 from hexacell.errors import DeviceError, HexacellError
 from procedures.devices.device_set import Devices, MountedGauge, gather_errors
 from procedures.run.trips import Guard, GuardTripped, causes_of
 
-GAUGE_ERRORS = (GaugeSilent, WrongAnswer, WrongSetting, ZeroVoid, PortLost)
-ENCODER_ERRORS = (BusError, SilentNodeError, RestartedNodeError)
+GAUGE_ERRORS = (
+    errors.GaugeSilent,
+    errors.WrongAnswer,
+    errors.WrongSetting,
+    errors.ZeroVoid,
+    errors.PortLost,
+)
+ENCODER_ERRORS = (errors.BusError, errors.SilentNodeError, errors.RestartedNodeError)
 
 
 class DeviceReplaced(DeviceError):
@@ -32,14 +28,14 @@ async def reconnect(devices: Devices, error: HexacellError, known: Sequence[Devi
 
     Raises ``DeviceReplaced`` if another device answers, another ``HexacellError`` if none does.
     """
-    errors = causes_of(error)
-    gauges = [mounted for mounted in devices.gauges if _concerns(mounted, errors)]
+    causes = causes_of(error)
+    gauges = [mounted for mounted in devices.gauges if _concerns(mounted, causes)]
     await gather_errors("gauges cannot be closed", [mounted.gauge.close() for mounted in gauges])
     found = await gather_errors("gauges cannot be reopened", [mounted.gauge.open() for mounted in gauges])
-    if any(isinstance(one, ENCODER_ERRORS) or _has_failed(one, "encoders") for one in errors):
+    if any(isinstance(one, ENCODER_ERRORS) or _has_failed(one, "encoders") for one in causes):
         await devices.encoders.close()
         found += await devices.encoders.open()
-    if any(isinstance(one, ConnectionLost) or _has_failed(one, "controller") for one in errors):
+    if any(isinstance(one, errors.ConnectionLost) or _has_failed(one, "controller") for one in causes):
         await devices.controller.close()
         found.append(await devices.controller.open())
     require_known(found, known)
@@ -64,9 +60,9 @@ def require_known(found: Iterable[DeviceIdentity], known: Sequence[DeviceIdentit
             )
 
 
-def _concerns(mounted: MountedGauge, errors: Sequence[HexacellError]) -> bool:
+def _concerns(mounted: MountedGauge, causes: Sequence[HexacellError]) -> bool:
     """Whether an error names the gauge; gauges on one port are named together: ``gauges x, y``."""
-    for one in errors:
+    for one in causes:
         word, _, names = (one.subject or "").partition(" ")
         is_named = word in {"gauge", "gauges"} and mounted.gauge.name in names.split(", ")
         if is_named and (isinstance(one, GAUGE_ERRORS) or _has_failed(one, one.subject or "")):

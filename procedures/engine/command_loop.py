@@ -11,21 +11,7 @@ from functools import reduce
 from typing import Any, TypeVar
 
 from hexacell.errors import UsageError
-from procedures.engine.commands import (
-    Abort,
-    Answer,
-    Command,
-    CommandQueue,
-    EndAtReference,
-    Invalidation,
-    MeasureAgain,
-    Pause,
-    QuestionBroker,
-    Resume,
-    Stop,
-    Undo,
-    invalidation_event,
-)
+from procedures.engine import commands
 from procedures.run.cancellation import cancel_and_wait
 from procedures.run.state import RunState, apply
 
@@ -93,13 +79,13 @@ class CommandLoop:
     ``state`` gives the present state of the run; ``reject`` is called with each refused command, and why.
     """
 
-    queue: CommandQueue
-    broker: QuestionBroker
+    queue: commands.CommandQueue
+    broker: commands.QuestionBroker
     state: Callable[[], RunState]
-    reject: Callable[[Command, str], None]
+    reject: Callable[[commands.Command, str], None]
     flags: EngineFlags = EngineFlags()
     watchers: list[Callable[[Status], None]] = field(default_factory=list)
-    _invalidations: list[Invalidation] = field(default_factory=list)
+    _invalidations: list[commands.Invalidation] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.broker.watchers.append(lambda question: self.set_flags(asking=question is not None))
@@ -138,7 +124,7 @@ class CommandLoop:
         for command in self.queue.take():
             self._take(command)
 
-    def take_invalidations(self) -> list[Invalidation]:
+    def take_invalidations(self) -> list[commands.Invalidation]:
         """What commands made invalid, oldest first, of the records of then; only once."""
         taken, self._invalidations = self._invalidations, []
         return taken
@@ -147,45 +133,45 @@ class CommandLoop:
         while not self._take(await self.queue.next()):
             pass
 
-    def _take(self, command: Command) -> bool:
+    def _take(self, command: commands.Command) -> bool:
         """Take one command; whether it cancels what is running."""
         flags = self.flags
         match command:
-            case Stop():
+            case commands.Stop():
                 self.set_flags(stopping=flags.stopping or command.reason)
                 return flags.asking
-            case EndAtReference():
+            case commands.EndAtReference():
                 self.set_flags(returning=flags.returning or command.reason)
                 return flags.asking
-            case Abort():
+            case commands.Abort():
                 self.set_flags(stopping=command.reason)
                 return True
-            case Pause() if flags.fault is None:
+            case commands.Pause() if flags.fault is None:
                 self.set_flags(pausing=True, at_once=flags.at_once or command.at_once)
                 return command.at_once or flags.asking
-            case Resume() if flags.paused or flags.pausing:
+            case commands.Resume() if flags.paused or flags.pausing:
                 self.set_flags(pausing=False, at_once=False, paused=False)
-            case Answer() if self.broker.answer(command.value):
+            case commands.Answer() if self.broker.answer(command.value):
                 pass
-            case Undo() | MeasureAgain():
+            case commands.Undo() | commands.MeasureAgain():
                 return self._invalidate(command) and flags.asking and flags.fault is None
             case _:
                 self.reject(command, _refusal(command, flags))
         return False
 
-    def _invalidate(self, command: Undo | MeasureAgain) -> bool:
+    def _invalidate(self, command: commands.Undo | commands.MeasureAgain) -> bool:
         """Request what the command asks for; whether it is possible."""
         expected = reduce(apply, self._invalidations, self.state())
         try:
-            self._invalidations.append(invalidation_event(command, expected))
+            self._invalidations.append(commands.invalidation_event(command, expected))
         except UsageError as refusal:
             self.reject(command, str(refusal))
             return False
         return True
 
 
-def _refusal(command: Command, flags: EngineFlags) -> str:
-    if isinstance(command, Answer):
+def _refusal(command: commands.Command, flags: EngineFlags) -> str:
+    if isinstance(command, commands.Answer):
         return "no question is open that this would answer"
     if flags.fault is not None:
         return "a fault waits for a decision on how to continue"

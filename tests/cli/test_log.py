@@ -27,7 +27,7 @@ def test_a_failure_and_a_fault_are_logged(typed_here, quick_cell, tmp_path, monk
     file = tmp_path / "hexacell.log"
     assert typed_here("status", tmp_path / "no.toml", "--log-file", file).code == 2
     assert "ERROR hexacell.cli.app: exit code 2: " in file.read_text()
-    monkeypatch.setattr("hexacell.cli.commands.status.cell_status", None)
+    monkeypatch.setattr("hexacell.services.history.cell_status.cell_status", None)
     assert typed_here("status", quick_cell.cell, "--log-file", file).code == 70
     assert "TypeError: 'NoneType' object is not callable" in file.read_text()
 

@@ -73,7 +73,7 @@ def test_a_run_that_cannot_begin_is_told_too(typed_here, quick_cell) -> None:
 def test_what_happens_while_it_is_told_leaves_the_exit_code(
     typed_here, quick_cell, monkeypatch, raised, told
 ) -> None:
-    monkeypatch.setattr("hexacell.cli.commands.unattended.notify_all", Mock(side_effect=raised))
+    monkeypatch.setattr("hexacell.services.unattended.outbox.notify_all", Mock(side_effect=raised))
     tell(quick_cell, "hall", "http://127.0.0.1:1/")
     with cell_lock(quick_cell.controller):
         outcome = typed_here("run", quick_cell.cell, *CHECK)

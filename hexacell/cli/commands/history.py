@@ -12,15 +12,9 @@ from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
 from hexacell.results.run_comparison import ParameterTrend, RunComparison
 from hexacell.runs.run_folder import RunFolder, find_run
+from hexacell.services.history import past_runs
 from hexacell.services.history.cell_status import fleet_runs
 from hexacell.services.history.drift_history import DriftHistory, drift_history
-from hexacell.services.history.past_runs import (
-    compare_runs,
-    delete_runs,
-    parameter_trends,
-    past_runs,
-    retention,
-)
 from hexacell.services.history.run_index import RunIndex
 from hexacell.services.write_back.config_history import ConfigWrite, config_history
 from hexacell.text.config_changes import config_history_text
@@ -39,7 +33,7 @@ def main(options: argparse.Namespace, console: Console) -> ExitCode:
         return _fleet(options, console)
     cell = cell_at(options.cell, console)
     if options.compare is not None:
-        compared = compare_runs(cell, *options.compare)
+        compared = past_runs.compare_runs(cell, *options.compare)
         console.show(_comparison_document(*compared), comparison_text(*compared))
     elif options.show is not None:
         run = find_run(cell, options.show)
@@ -57,13 +51,16 @@ def main(options: argparse.Namespace, console: Console) -> ExitCode:
         _changes(cell, console)
     elif options.drift:
         index = _index(cell, options, console)
-        found, watched = parameter_trends(cell, past_runs(cell, index), index), drift_history(cell, index)
+        found, watched = (
+            past_runs.parameter_trends(cell, past_runs.past_runs(cell, index), index),
+            drift_history(cell, index),
+        )
         console.show(
             _drift_document(found, watched),
             "\n".join(filter(None, [watch_text(watched), drift_text(found)])),
         )
     else:
-        runs = past_runs(cell, _index(cell, options, console))
+        runs = past_runs.past_runs(cell, _index(cell, options, console))
         listed = [
             {"run": one.folder.path, "in_controller": one.is_in_controller, **one.summary.document}
             for one in runs
@@ -93,9 +90,9 @@ def _keep(cell: Cell, options: argparse.Namespace, console: Console) -> None:
     """Say which old runs may go, and delete them if that is asked for."""
     if not 0.0 <= options.keep <= MOST_DAYS:
         raise UsageError("--keep takes a number of days", action=f"Write one from 0 to {MOST_DAYS:g}")
-    found = retention(cell, options.keep, _index(cell, options, console))
+    found = past_runs.retention(cell, options.keep, _index(cell, options, console))
     if options.delete:
-        delete_runs(cell, found.leaving)
+        past_runs.delete_runs(cell, found.leaving)
     document = {
         "before": found.before,
         "deleted": options.delete,

@@ -15,15 +15,7 @@ from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, FileError, HexacellError, UsageError
 from hexacell.plugins import plugin_failures_named
 from hexacell.printable import printable
-from hexacell.services.history.cell_status import (
-    CellStatus,
-    FleetCell,
-    FleetRun,
-    cell_status,
-    fleet_cells,
-    publish_status,
-    summary_of,
-)
+from hexacell.services.history import cell_status
 from hexacell.text.history import legs_text
 from hexacell.text.layout import error_with_u, figure_with_u, minute, verdict_word
 from hexacell.verdict.decision import Verdict
@@ -60,7 +52,7 @@ def main(options: argparse.Namespace, console: Console) -> ExitCode:
     found, unreadable = _all(options.cells, console)
     for one in found:
         try:
-            publish_status(one)
+            cell_status.publish_status(one)
         except FileError as error:
             console.warn(" ".join(str(error).split()))
     if options.metrics is not None:
@@ -71,16 +63,18 @@ def main(options: argparse.Namespace, console: Console) -> ExitCode:
     return ExitCode.USAGE if unreadable else ExitCode.DONE
 
 
-def _all(paths: Sequence[Path], console: Console) -> tuple[list[CellStatus], dict[Path, HexacellError]]:
+def _all(
+    paths: Sequence[Path], console: Console
+) -> tuple[list[cell_status.CellStatus], dict[Path, HexacellError]]:
     """Every cell; one that is broken hides no other. What a pattern names beside them is left out."""
-    found: list[CellStatus] = []
+    found: list[cell_status.CellStatus] = []
     unreadable: dict[Path, HexacellError] = {}
     for path in paths:
         if len(paths) > 1 and not is_cell_file(path):
             continue
         try:
             with plugin_failures_named():
-                found.append(cell_status(cell_at(path, console)))
+                found.append(cell_status.cell_status(cell_at(path, console)))
         except HexacellError as error:
             if len(paths) == 1:
                 raise
@@ -93,13 +87,13 @@ def _fleet(options: argparse.Namespace, console: Console) -> ExitCode:
         raise UsageError("no cell is named", action="Name cell files, or --archive URL for all")
     if options.metrics is not None:
         raise UsageError("metrics are of cells of this computer", action="Name their cell files")
-    found = fleet_cells(archive_url(options.archive))
+    found = cell_status.fleet_cells(archive_url(options.archive))
     cells = [one.model_dump(mode="json") | {"overdue": one.is_overdue} for one in found]
     console.show({"cells": cells}, fleet_text(found))
     return ExitCode.DONE
 
 
-def status_text(found: Sequence[CellStatus], unreadable: Mapping[Path, HexacellError]) -> str:
+def status_text(found: Sequence[cell_status.CellStatus], unreadable: Mapping[Path, HexacellError]) -> str:
     """A line a cell, and below it what needs somebody; the broken ones at the end."""
     head = f"{'cell':{LONGEST_NAME}} {'latest verdict':17} {'error, mm':16} {'when':17} in use"
     lines = [head, *(line for one in found for line in _lines(one))]
@@ -108,7 +102,7 @@ def status_text(found: Sequence[CellStatus], unreadable: Mapping[Path, HexacellE
     return "\n".join(lines)
 
 
-def metrics_text(found: Sequence[CellStatus]) -> str:
+def metrics_text(found: Sequence[cell_status.CellStatus]) -> str:
     """All samples, those of one metric together, each with its help."""
     samples: dict[str, list[str]] = {name: [] for name in HELP}
     for one in found:
@@ -127,7 +121,7 @@ def _escaped(text: str) -> str:
     return printable(text).translate(ESCAPES)
 
 
-def _lines(one: CellStatus) -> Iterator[str]:
+def _lines(one: cell_status.CellStatus) -> Iterator[str]:
     figures, latest = one.figures, one.latest
     verdict, error = verdict_word(figures.verdict), figure_with_u(figures.position_mm, figures.expanded_mm)
     when, used = minute(figures.judged_at), "no" if one.in_use_by is None else f"by {one.in_use_by}"
@@ -145,7 +139,7 @@ def _lines(one: CellStatus) -> Iterator[str]:
         yield f"  leg {legs_text(last)} changed, {noticed}; hexacell history --drift shows more"
 
 
-def status_document(one: CellStatus) -> dict[str, Any]:
+def status_document(one: cell_status.CellStatus) -> dict[str, Any]:
     """What ``status --json`` prints of a cell."""
     worst = one.worst_share
     return one.figures.model_dump(exclude={"host", "seen_at", "latest_run", "latest_at", "mode"}) | {
@@ -158,16 +152,16 @@ def status_document(one: CellStatus) -> dict[str, Any]:
     }
 
 
-def _samples(one: CellStatus) -> Iterator[tuple[str, dict[str, str], str]]:
+def _samples(one: cell_status.CellStatus) -> Iterator[tuple[str, dict[str, str], str]]:
     yield "hexacell_in_use", {}, str(int(one.in_use_by is not None))
     yield "hexacell_open_proposal", {}, str(int(one.proposal is not None))
     yield "hexacell_changes_found", {}, str(len(one.drift.changes))
     if one.latest is not None:
         yield "hexacell_last_run_begun", {}, str(int(one.latest.summary.has_begun))
     times = {
-        "hexacell_last_run_timestamp_seconds": summary_of(one.latest).ended,
+        "hexacell_last_run_timestamp_seconds": cell_status.summary_of(one.latest).ended,
         "hexacell_last_pass_timestamp_seconds": one.figures.passed_at,
-        "hexacell_calibration_timestamp_seconds": summary_of(one.in_force).ended,
+        "hexacell_calibration_timestamp_seconds": cell_status.summary_of(one.in_force).ended,
         "hexacell_calibration_due_timestamp_seconds": one.figures.due_at,
     }
     yield from ((name, {}, repr(at.timestamp())) for name, at in times.items() if at is not None)
@@ -185,7 +179,7 @@ def _samples(one: CellStatus) -> Iterator[tuple[str, dict[str, str], str]]:
         yield "hexacell_position_limit_mm", {}, repr(position.limit)
 
 
-def fleet_text(cells: Sequence[FleetCell]) -> str:
+def fleet_text(cells: Sequence[cell_status.FleetCell]) -> str:
     """A line a cell of an archive, of at most 80 columns, and below it what needs somebody."""
     if not cells:
         return NO_CELLS
@@ -193,7 +187,7 @@ def fleet_text(cells: Sequence[FleetCell]) -> str:
     return "\n".join([head, *(line for one in cells for line in _fleet_cell_lines(one))])
 
 
-def _fleet_cell_lines(one: FleetCell) -> Iterator[str]:
+def _fleet_cell_lines(one: cell_status.FleetCell) -> Iterator[str]:
     error = figure_with_u(one.position_mm, one.expanded_mm)
     yield _fleet_columns(one.name, one.host, verdict_word(one.verdict), error, minute(one.latest_at))
     yield from _due_line(one)
@@ -203,12 +197,12 @@ def _fleet_cell_lines(one: FleetCell) -> Iterator[str]:
         yield "  the robot has changed; hexacell history --drift on its computer shows more"
 
 
-def _due_line(one: FleetCell) -> Iterator[str]:
+def _due_line(one: cell_status.FleetCell) -> Iterator[str]:
     if one.due_at is not None:
         yield f"  calibration {'OVERDUE since' if one.is_overdue else 'due on'} {one.due_at:%Y-%m-%d}"
 
 
-def fleet_history_text(runs: Sequence[FleetRun]) -> str:
+def fleet_history_text(runs: Sequence[cell_status.FleetRun]) -> str:
     """A line a run of an archive."""
     if not runs:
         return NO_FLEET_RUNS

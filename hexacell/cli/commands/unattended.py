@@ -14,19 +14,13 @@ from hexacell.errors import ExitCode, FileError, HexacellError, UsageError
 from hexacell.plugins import plugin_failures_named
 from hexacell.services.history.cell_status import cell_status, publish_status
 from hexacell.services.run.calibration_run import RunRequest
+from hexacell.services.unattended import outbox
 from hexacell.services.unattended.notice import (
     PendingNotice,
     RunEnd,
     notice_of_end,
     notice_of_failure,
     notice_of_test,
-)
-from hexacell.services.unattended.outbox import (
-    NotifyOutcome,
-    notify_all,
-    notify_test,
-    send_waiting,
-    waiting_notices,
 )
 from hexacell.services.unattended.scheduled_run import ScheduledRun, skipped_day
 from hexacell.services.unattended.schedules import (
@@ -111,7 +105,7 @@ def _notify(request: RunRequest, console: Console, end: RunEnd | Exception) -> N
         return
     try:
         notice = notice_of_end(end) if isinstance(end, RunEnd) else notice_of_failure(request, end)
-        line = notify_line(notify_all(request.cell, notice))
+        line = notify_line(outbox.notify_all(request.cell, notice))
     except KeyboardInterrupt:
         line = f"not notified: interrupted ({NEXT_TIME})"
     except Exception as fault:
@@ -154,7 +148,7 @@ def notify(options: argparse.Namespace, console: Console) -> ExitCode:
     """List, send what waits, or try everybody."""
     cell = cell_at(options.cell, console)
     if not (options.test or options.send):
-        settings, waiting = cell.settings.notifications, waiting_notices(cell)
+        settings, waiting = cell.settings.notifications, outbox.waiting_notices(cell)
         console.show(
             {"notifications": [{"name": one.name, "on": one.on} for one in settings], "waiting": waiting},
             notifications_text(settings, waiting),
@@ -163,7 +157,7 @@ def notify(options: argparse.Namespace, console: Console) -> ExitCode:
     if options.test and not cell.settings.notifications:
         action = "Write [[notifications]]"
         raise UsageError("nobody is notified of its runs", subject=cell.path, action=action)
-    outcome = notify_test(cell, notice_of_test(cell)) if options.test else send_waiting(cell)
+    outcome = outbox.notify_test(cell, notice_of_test(cell)) if options.test else outbox.send_waiting(cell)
     recipients = [
         {"name": one.name, "told": one.sent, "wait": one.wait, "problem": one.problem}
         for one in outcome.deliveries
@@ -174,7 +168,7 @@ def notify(options: argparse.Namespace, console: Console) -> ExitCode:
     return ExitCode.DONE if outcome.are_all_sent else ExitCode.HARDWARE
 
 
-def notify_line(outcome: NotifyOutcome) -> str | None:
+def notify_line(outcome: outbox.NotifyOutcome) -> str | None:
     """What went wrong, in one line; None if nothing did."""
     problems = [
         f"{one.name}: {one.problem}{f', {one.wait} wait' if one.wait > 1 else ''}"
@@ -188,7 +182,7 @@ def notify_line(outcome: NotifyOutcome) -> str | None:
     return f"not notified: {'; '.join(problems)}{f' ({NEXT_TIME})' if waits else ''}"
 
 
-def _dropped(outcome: NotifyOutcome) -> list[str]:
+def _dropped(outcome: outbox.NotifyOutcome) -> list[str]:
     return [f"{outcome.dropped} notices were given up: too old, or too many"] if outcome.dropped else []
 
 

@@ -6,13 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hexacell.identification.data_faults import hypotheses
 from hexacell.identification.data_faults.deletion_tests import DeletionTest, deletion_tests
-from hexacell.identification.data_faults.hypotheses import (
-    FaultHypothesis,
-    OutlierHypothesis,
-    ZeroShiftHypothesis,
-    rank_hypotheses,
-)
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareVerdict
 from hexacell.identification.solver.fit import COARSE, QUICK, SolverOptions, fit_regularized
@@ -45,7 +40,7 @@ class CorrectedFit:
     original: Problem
     problem: Problem
     fit: Identification
-    faults: tuple[FaultHypothesis, ...] = ()
+    faults: tuple[hypotheses.FaultHypothesis, ...] = ()
 
     @classmethod
     def uncorrected(cls, problem: Problem, options: SolverOptions = QUICK) -> CorrectedFit:
@@ -57,14 +52,14 @@ class CorrectedFit:
         cls,
         original: Problem,
         problem: Problem,
-        faults: tuple[FaultHypothesis, ...] = (),
+        faults: tuple[hypotheses.FaultHypothesis, ...] = (),
         options: SolverOptions = QUICK,
         start: Array | None = None,
     ) -> CorrectedFit:
         """Fit the records ``problem``, which are corrected for some faults."""
         return cls(original, problem, fit_regularized(problem, options, start), faults)
 
-    def corrected_for(self, hypothesis: FaultHypothesis) -> CorrectedFit:
+    def corrected_for(self, hypothesis: hypotheses.FaultHypothesis) -> CorrectedFit:
         """The fit after correction for one more fault."""
         problem = hypothesis.corrected(self.problem)
         return self.fitted(self.original, problem, (*self.faults, hypothesis))
@@ -72,14 +67,14 @@ class CorrectedFit:
     @property
     def rejected(self) -> list[RecordId]:
         """The records rejected for gross errors."""
-        outliers = (fault for fault in self.faults if isinstance(fault, OutlierHypothesis))
+        outliers = (fault for fault in self.faults if isinstance(fault, hypotheses.OutlierHypothesis))
         return [record for outlier in outliers for record in outlier.records]
 
     @property
-    def zero_shifts(self) -> dict[ZeroShiftHypothesis, list[RecordId]]:
+    def zero_shifts(self) -> dict[hypotheses.ZeroShiftHypothesis, list[RecordId]]:
         """The shifts of the gauges' zero that were corrected, each with all records after it."""
         ids = np.array(self.original.record_ids)
-        shifts = [fault for fault in self.faults if isinstance(fault, ZeroShiftHypothesis)]
+        shifts = [fault for fault in self.faults if isinstance(fault, hypotheses.ZeroShiftHypothesis)]
         return {shift: [*map(tuple, ids[shift.rows(self.original)].tolist())] for shift in shifts}
 
     @property
@@ -118,9 +113,9 @@ class CorrectedFit:
         is_near_noise = self.is_reliable and self.misfit <= SETTLING_MISFIT
         return self.is_consistent or (is_near_noise and self.misfit < other.misfit / SETTLING_DECREASE)
 
-    def likely_hypotheses(self) -> list[FaultHypothesis]:
+    def likely_hypotheses(self) -> list[hypotheses.FaultHypothesis]:
         """What may be wrong, the most likely first."""
-        return rank_hypotheses(
+        return hypotheses.rank_hypotheses(
             self.problem, self.fit, found_before=len(self.rejected), is_trusted=self.is_reliable
         )
 
@@ -129,7 +124,7 @@ class CorrectedFit:
         shifted = {record for after in self.zero_shifts.values() for record in after}
         return deletion_tests(self.original, self.fit, without=shifted - {*self.rejected})
 
-    def only_for(self, faults: tuple[FaultHypothesis, ...]) -> CorrectedFit:
+    def only_for(self, faults: tuple[hypotheses.FaultHypothesis, ...]) -> CorrectedFit:
         """The fit of all records as measured after correction for some faults, from this solution."""
         problem = self.original
         for fault in faults:

@@ -2,13 +2,9 @@
 
 import numpy as np
 
+from hexacell.identification.data_faults import hypotheses
 from hexacell.identification.data_faults.corrected_fit import CorrectedFit
 from hexacell.identification.data_faults.deletion_tests import DeletionTest
-from hexacell.identification.data_faults.hypotheses import (
-    MM_PER_INCH,
-    GaugeFaultHypothesis,
-    ZeroShiftHypothesis,
-)
 from hexacell.identification.data_faults.stepwise_selection import Selection, UncorrectableFaultError
 from hexacell.identification.solver.result import GAUGES, DataFault, DataFaultKind
 from hexacell.lengths import shown
@@ -21,8 +17,8 @@ GAUGE_FAULT_WORDS = {
     DataFaultKind.INCHES: (
         "seems to read in inches",
         "seem to read in inches",
-        f"if these readings are multiplied by {MM_PER_INCH}",
-        f"Switch to millimetres and measure again, or multiply {{columns}} by {MM_PER_INCH}",
+        f"if these readings are multiplied by {hypotheses.MM_PER_INCH}",
+        f"Switch to millimetres and measure again, or multiply {{columns}} by {hypotheses.MM_PER_INCH}",
     ),
     DataFaultKind.REVERSED: (
         "looks reversed",
@@ -52,11 +48,11 @@ def left_out(selection: Selection) -> tuple[DataFault, ...]:
 def refused(error: UncorrectableFaultError) -> DataFault:
     """A fault for which the data are refused."""
     match error.fault:
-        case ZeroShiftHypothesis() as shift:
+        case hypotheses.ZeroShiftHypothesis() as shift:
             found = error.left.equations
             consequence = f", and the records before it and at the other points give only {found} equations"
             return _zero_shift(shift, consequence)
-        case GaugeFaultHypothesis():
+        case hypotheses.GaugeFaultHypothesis():
             return _gauge_faults(error.before, error.after)
     raise TypeError(error.fault)
 
@@ -88,7 +84,7 @@ def _rejected_record(test: DeletionTest) -> DataFault:
 
 def _gauge_faults(before: CorrectedFit, after: CorrectedFit) -> DataFault:
     """The residuals before and after the correction of all that was found are the evidence."""
-    found = [one for one in after.faults if isinstance(one, GaugeFaultHypothesis)]
+    found = [one for one in after.faults if isinstance(one, hypotheses.GaugeFaultHypothesis)]
     looks, corrections, actions = zip(*map(_gauge_fault_words, found), strict=True)
     without, rest = "", ""
     if before.lost:
@@ -104,7 +100,7 @@ def _gauge_faults(before: CorrectedFit, after: CorrectedFit) -> DataFault:
     return DataFault(found[0].gauge_fault.kind, sentence, ". ".join(actions), gauges=gauges)
 
 
-def _gauge_fault_words(hypothesis: GaugeFaultHypothesis) -> tuple[str, str, str]:
+def _gauge_fault_words(hypothesis: hypotheses.GaugeFaultHypothesis) -> tuple[str, str, str]:
     """How a gauge fault looks, what corrects it, and what to do."""
     fault = hypothesis.gauge_fault
     where = "at every point" if hypothesis.point is None else f"at point {hypothesis.point}"
@@ -133,7 +129,7 @@ def _wrong_readings(kind: DataFaultKind, gauges: str, offset_mm: Deviation) -> s
 
 
 def _zero_shift(
-    shift: ZeroShiftHypothesis, consequence: str, left_out: tuple[RecordId, ...] = ()
+    shift: hypotheses.ZeroShiftHypothesis, consequence: str, left_out: tuple[RecordId, ...] = ()
 ) -> DataFault:
     size = np.abs(shift.shift)
     shifted = [axis for axis in range(3) if size[axis] >= NAMED_SHARE * size.max()]

@@ -37,15 +37,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hexacell.kinematics import mechanism
 from hexacell.kinematics.geometry import Geometries, Geometry
 from hexacell.kinematics.legs import by_pose
-from hexacell.kinematics.mechanism import (
-    Branch,
-    ConstraintDerivatives,
-    FrameConvention,
-    FrameFreedom,
-    MechanismWords,
-)
 from hexacell.kinematics.mechanisms.jointed_legs import JointedLegs
 from hexacell.kinematics.parameters import MachinePart, ParameterKind, ParameterSet
 from hexacell.kinematics.pose import PoseBatch
@@ -85,7 +79,7 @@ GOUGH_STEWART_PARAMETERS = ParameterSet(
     has_branch=False,
 )
 
-THREE_LEGS_FRAME = FrameConvention(
+THREE_LEGS_FRAME = mechanism.FrameConvention(
     name="joints of legs 1, 3 and 5",
     parameters=GOUGH_STEWART_PARAMETERS,
     zero=("base1x", "base1y", "base1z", "base3y", "base3z", "base5z"),
@@ -97,16 +91,16 @@ class GoughStewart(JointedLegs):
     """The Gough-Stewart platform; its lengths are what the encoders show, from the offsets on."""
 
     name = "gough-stewart"
-    words = MechanismWords("Gough-Stewart platform", joint="leg")
+    words = mechanism.MechanismWords("Gough-Stewart platform", joint="leg")
     parameters = GOUGH_STEWART_PARAMETERS
     convention = THREE_LEGS_FRAME
-    frame_freedom = FrameFreedom()
+    frame_freedom = mechanism.FrameFreedom()
     base_joint, platform_joint, length = "base", "platform", "offset"
 
     def lengths(self, geometry: Geometries, joints: Array) -> Array:
         return geometry["offset"] + joints
 
-    def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
+    def inverse(self, geometry: Geometry, branch: mechanism.Branch, poses: PoseBatch) -> Array:
         """Joint variables (n, 6) at n poses; every pose has a solution."""
         _, v = self.leg_vectors(geometry, poses, np.zeros(6))
         joints: Array = np.linalg.norm(v, axis=-1) - geometry["offset"]
@@ -170,17 +164,19 @@ class ScrewLegs(GoughStewart):
         b, found = self._corrections(geometry, poses)
         return residual + found.added, jacobian + _by_pose(b, found)
 
-    def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
+    def derivatives(
+        self, geometry: Geometry, poses: PoseBatch, joints: Array
+    ) -> mechanism.ConstraintDerivatives:
         without = super().derivatives(geometry, poses, joints)
         b, found = self._corrections(geometry, poses)
         by_joints = [-found.by_vector, found.by_vector @ poses.rotations, np.zeros((*joints.shape, 1))]
-        return ConstraintDerivatives(
+        return mechanism.ConstraintDerivatives(
             pose=without.pose + _by_pose(b, found),
             joints=without.joints,
             parameters=without.parameters + np.concatenate(by_joints, axis=-1),
         )
 
-    def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
+    def inverse(self, geometry: Geometry, branch: mechanism.Branch, poses: PoseBatch) -> Array:
         without = super().inverse(geometry, branch, poses)
         return without + self._corrections(geometry, poses)[1].added
 

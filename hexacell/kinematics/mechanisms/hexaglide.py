@@ -8,16 +8,9 @@ Source: Abtahi et al. 2010, eq. 4 and 14, and the leg equation in ``docs/method.
 import numpy as np
 
 from hexacell.errors import UsageError
+from hexacell.kinematics import mechanism
 from hexacell.kinematics.geometry import Geometries, Geometry
 from hexacell.kinematics.legs import CLOSEST_JOINTS_MM, axes_through, by_pose
-from hexacell.kinematics.mechanism import (
-    Branch,
-    ConstraintDerivatives,
-    FrameConvention,
-    FrameFreedom,
-    Guides,
-    MechanismWords,
-)
 from hexacell.kinematics.mechanisms.jointed_legs import JointedLegs
 from hexacell.kinematics.parameters import MachinePart, ParameterKind, ParameterSet
 from hexacell.kinematics.pose import FrameTransform, PoseBatch
@@ -55,7 +48,7 @@ HEXAGLIDE_PARAMETERS = ParameterSet(
     )
 )
 
-PAPER_FRAME = FrameConvention(
+PAPER_FRAME = mechanism.FrameConvention(
     name="paper",
     parameters=HEXAGLIDE_PARAMETERS,
     zero=("S2x", "S2y", "S2z", "S3z"),
@@ -71,10 +64,10 @@ class Hexaglide(JointedLegs):
     """The Hexaglide, with constraints of its own that are polynomials."""
 
     name = "hexaglide"
-    words = MechanismWords("Hexaglide", joint="slider", guide="rail")
+    words = mechanism.MechanismWords("Hexaglide", joint="slider", guide="rail")
     parameters = HEXAGLIDE_PARAMETERS
     convention = PAPER_FRAME
-    frame_freedom = FrameFreedom(base="x")  # the rails run along base x
+    frame_freedom = mechanism.FrameFreedom(base="x")  # the rails run along base x
     base_joint, platform_joint, length = "S", "B", "l"
 
     def leg_vectors(self, geometry: Geometries, poses: PoseBatch, joints: Array) -> tuple[Array, Array]:
@@ -92,14 +85,16 @@ class Hexaglide(JointedLegs):
         errors = (np.einsum("nij,nij->ni", v, v) - lengths**2) / (2.0 * lengths)
         return errors, by_pose(b, -v / lengths[..., None])
 
-    def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
+    def derivatives(
+        self, geometry: Geometry, poses: PoseBatch, joints: Array
+    ) -> mechanism.ConstraintDerivatives:
         b, v = self.leg_vectors(geometry, poses, joints)
         n = v / geometry["l"][:, None]
         by_length = -0.5 * (np.sum(n * n, axis=-1, keepdims=True) + 1.0)
         by_parameters = np.concatenate([n, -n @ poses.rotations, by_length], axis=-1)
-        return ConstraintDerivatives(by_pose(b, -n), n[..., 0], by_parameters)
+        return mechanism.ConstraintDerivatives(by_pose(b, -n), n[..., 0], by_parameters)
 
-    def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
+    def inverse(self, geometry: Geometry, branch: mechanism.Branch, poses: PoseBatch) -> Array:
         _, v = self.leg_vectors(geometry, poses, np.zeros(6))
         along_rail_squared = geometry["l"] ** 2 - v[..., 1] ** 2 - v[..., 2] ** 2
         reachable = along_rail_squared >= 0.0
@@ -126,7 +121,7 @@ class Hexaglide(JointedLegs):
         moved[np.arange(6), 0, np.arange(6)] = 1.0
         return self.parameters.changes("S", moved)
 
-    def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
+    def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> mechanism.Guides | None:
         _, v = self.leg_vectors(geometry, poses, joints)
         n = v / geometry["l"][:, None]
-        return Guides(RAILS, along=geometry["S"][:, 0] + joints, across=n[..., 1:])
+        return mechanism.Guides(RAILS, along=geometry["S"][:, 0] + joints, across=n[..., 1:])

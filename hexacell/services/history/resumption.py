@@ -13,13 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from hexacell.cell.loader import Cell
+from hexacell.config import layout
 from hexacell.config.change import BEFORE, RECEIPT, ConfigChange, Receipt, kept_paths
-from hexacell.config.layout import (
-    are_same_files,
-    controller_geometry,
-    fingerprint_of,
-    read_contents_if_present,
-)
 from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import SAME_FRAMES, Pose, PoseBatch
@@ -80,7 +75,7 @@ def require_own_run(cell: Cell, folder: RunFolder, state: RunState, *, is_resume
     assert state.started is not None  # noqa: S101 - a journal without a start is not resumed
     if is_resumed and folder.proposal.exists():  # it names the config of the cell before that was copied
         named = ConfigChange.load(folder.proposal).paths
-        if not are_same_files(named, state.started.config_paths):
+        if not layout.are_same_files(named, state.started.config_paths):
             _require_own_config(cell, folder.proposal, named)
     _require_own_geometry(cell, folder, state, state.started)
     _require_own_poses(cell, folder, state, state.started)
@@ -95,7 +90,7 @@ def _require_no_links(folder: Path) -> None:
 
 
 def _require_own_config(cell: Cell, path: Path, named: tuple[Path, ...]) -> None:
-    if not are_same_files(named, cell.config_paths):
+    if not layout.are_same_files(named, cell.config_paths):
         raise FileError(
             f"is for another config, {' and '.join(map(str, named))}",
             subject=path,
@@ -110,8 +105,8 @@ def _require_own_geometry(
     """The journal must state the geometry of the config that the run began with."""
     count = len(cell.config_paths)
     kept = (kept_paths(one, BEFORE, count) for one in (folder.path, folder.path / PROVISIONAL_FOLDER))
-    contents = {one: read_contents_if_present(one) for one in (cell.config_paths, *kept)}
-    sums = {one: fingerprint_of(held) for one, held in contents.items() if held is not None}
+    contents = {one: layout.read_contents_if_present(one) for one in (cell.config_paths, *kept)}
+    sums = {one: layout.fingerprint_of(held) for one, held in contents.items() if held is not None}
     paths = next((one for one, sha256 in sums.items() if sha256 == started.config_sha256), None)
     if paths is None:
         if state.committed or state.provisional or state.rolling_back or state.config_write_pending:
@@ -119,7 +114,7 @@ def _require_own_geometry(
                 "the config as it was before the run is missing", subject=folder.path, action=RESTORE
             )
         return
-    found = controller_geometry(cell, *paths)
+    found = layout.controller_geometry(cell, *paths)
     stated = Geometry.of(cell.settings.mechanism.parameters, started.controller)
     if found.branch != started.branch or not np.array_equal(found.geometry.vector, stated.vector):
         raise _differs(folder, f"another geometry than {paths[0]}")

@@ -10,14 +10,7 @@ from pathlib import Path
 from hexacell.cell.model import CellSettings
 from hexacell.cell.operation import UnattendedSettings
 from hexacell.errors import ExitCode, HexacellError, OutOfTime
-from hexacell.runs.run_folder import (
-    RunFolder,
-    StartAttempt,
-    new_run,
-    new_run_in,
-    note_attempt,
-    runs_folder_of_unreadable,
-)
+from hexacell.runs import run_folder
 from hexacell.services.run.calibration_run import RunRequest
 from hexacell.verdict.decision import Verdict
 from procedures.calibration.calibration import Mode
@@ -64,15 +57,17 @@ def note_unreadable_cell(path: Path, mode: str, error: HexacellError) -> None:
 
     Nothing is noted where the cell's name is unknown, or the disk takes no note.
     """
-    folder = runs_folder_of_unreadable(path)
+    folder = run_folder.runs_folder_of_unreadable(path)
     if folder is not None:
-        _note_refusal(new_run_in(folder), mode, error, datetime.now(UTC))
+        _note_refusal(run_folder.new_run_in(folder), mode, error, datetime.now(UTC))
 
 
-def _note_refusal(folder: RunFolder, mode: str, error: HexacellError, at: datetime) -> None:
-    attempt = StartAttempt(at=at.astimezone(UTC), reason=str(error), exit_code=int(error.exit_code))
+def _note_refusal(folder: run_folder.RunFolder, mode: str, error: HexacellError, at: datetime) -> None:
+    attempt = run_folder.StartAttempt(
+        at=at.astimezone(UTC), reason=str(error), exit_code=int(error.exit_code)
+    )
     with suppress(HexacellError):
-        note_attempt(folder, mode, attempt)
+        run_folder.note_attempt(folder, mode, attempt)
 
 
 def time_limit(settings: CellSettings, at: datetime) -> tuple[float, str] | None:
@@ -143,4 +138,4 @@ def repetition(request: RunRequest, state: RunState) -> RunRequest | None:
     is_check = request.unattended and request.mode is Mode.CHECK
     if not is_check or state.alarm is None or state.verdict is Verdict.FAIL:
         return None
-    return replace(request, folder=new_run(request.cell), resume=False)
+    return replace(request, folder=run_folder.new_run(request.cell), resume=False)

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from datetime import UTC, datetime
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -63,24 +62,6 @@ async def stated(rig: Rig, *listeners: Any) -> LengthStatement:
     return found
 
 
-def zero_gauges(rig: Rig) -> None:
-    """A person presses the zero keys."""
-    for gauge in rig.gauges:
-        gauge.shown = partial(lambda shown, off: shown() - off, gauge.shown, gauge.shown())
-
-
-async def test_true_encoders_pass_and_nothing_is_written(make_length_rig) -> None:
-    rig = make_length_rig()
-    before = rig.config
-    found = await stated(rig)
-    assert found.verdict is Verdict.PASS
-    assert abs(found.result.long_um_m) <= found.result.expanded_um_m < 30.0
-    assert found.error is not None
-    assert found.error.value + found.error.expanded < 0.02
-    assert rig.config == before
-    assert "reload" not in rig.controller.log
-
-
 @pytest.mark.parametrize("long_um_m", [1000.0, -400.0])
 async def test_a_scale_of_all_encoders_is_found(make_length_rig, long_um_m: float) -> None:
     rig = make_length_rig(long_um_m=long_um_m)
@@ -92,10 +73,17 @@ async def test_a_scale_of_all_encoders_is_found(make_length_rig, long_um_m: floa
     assert found.verdict is Verdict.PASS  # of this cell, whose limit is 5 mm
 
 
-async def test_the_mountings_and_their_poses(make_length_rig) -> None:
+async def test_true_encoders_pass_after_three_mountings_and_nothing_is_written(make_length_rig) -> None:
     rig = make_length_rig()
+    before = rig.config
     told: list[Any] = []
-    await rig.run(lambda event, _: told.append(event))
+    found = await stated(rig, lambda event, _: told.append(event))
+    assert found.verdict is Verdict.PASS
+    assert abs(found.result.long_um_m) <= found.result.expanded_um_m < 30.0
+    assert found.error is not None
+    assert found.error.value + found.error.expanded < 0.02
+    assert rig.config == before
+    assert "reload" not in rig.controller.log
     samples = [event for event in told if isinstance(event, events.RecordTaken)]
     assert [event.at for event in told if isinstance(event, events.SetClosed)] == MOUNTINGS
     assert [(s.at, s.orientation) for s in samples] == [
@@ -142,21 +130,6 @@ async def test_gauges_the_wrong_way_round_in_the_second_seat_are_told(make_lengt
     assert found.verdict is Verdict.NOT_EVALUATED
     assert "at mounting 2 gauge x and y run against the ball" in found.result.reason
     assert "the wrong way round in their seat" in found.result.reason
-
-
-@pytest.mark.sample("when0")
-@pytest.mark.parametrize("when", [(2,), (3,), (2, 3)])
-async def test_gauges_that_are_zeroed_between_the_seats_are_told(make_length_rig, when) -> None:
-    """Also at every mounting, out of habit: then each first reading is zero."""
-    rig = make_length_rig()
-
-    def press(event: Any, _: RunState) -> None:
-        if isinstance(event, events.GaugesPlaced) and event.at.point in when:
-            zero_gauges(rig)
-
-    found = await stated(rig, press)
-    assert found.verdict is Verdict.NOT_EVALUATED
-    assert "they were zeroed in between" in found.result.reason
 
 
 async def test_a_ball_outside_the_travel_in_the_second_seat_is_told_with_what_to_check(make_length_rig):

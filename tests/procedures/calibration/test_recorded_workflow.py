@@ -42,16 +42,6 @@ def test_chosen_poses_gain_information_and_show_the_expected_deviations(recordin
     assert np.median(wrong_by) < 1.5
 
 
-def test_the_next_step_depends_on_the_state_only(recording, calibration) -> None:
-    """A resumed run chooses the same steps as an uninterrupted one."""
-    history = recording.history
-    places = [n for n, event in enumerate(history) if isinstance(event, events.StepBegun)]
-    for place in places[3::9]:
-        event = history[place]
-        assert isinstance(event, events.StepBegun)
-        assert next_step(calibration, fold(history[:place])) == event.step
-
-
 @pytest.mark.parametrize("undone", [(4, 2), (2, 4), (3, 4, 2)])
 def test_several_records_are_taken_again_one_after_the_other(recording, calibration, undone) -> None:
     """Whatever the order in which they were undone; the robot does not go to one and sample another."""

@@ -2,7 +2,7 @@
 
 import asyncio
 import threading
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from typing import Any
 
 import pytest
@@ -19,6 +19,7 @@ from procedures.steps.events import Step
 from procedures.steps.move import Move
 from procedures.steps.sample import Sample
 from tests.procedures.fakes import SilentOperator
+from tests.procedures.runs.listening import on
 from tests.procedures.story import READING
 from tests.waiting import until
 
@@ -265,37 +266,34 @@ async def test_a_command_from_another_thread_is_obeyed_at_once(stage: Stage) -> 
     thread.join()
 
 
-Meanwhile = Callable[[events.Event, RunState], None]
-
-
-def when_asked(rig: Any, *commands: Any) -> Meanwhile:
-    """Gives commands as soon as a question is open."""
-
-    def listener(event: events.Event, _: RunState) -> None:
-        if isinstance(event, events.RunStarted | events.Interrupted | events.StepBegun):
-            rig.engine.commands.watchers.append(
-                lambda status: (
-                    [rig.engine.queue.put(c) for c in commands]
-                    if status is Status.AWAITING_OPERATOR
-                    else None
-                )
-            )
-
-    return listener
-
-
-async def test_a_question_may_be_answered_by_command(recording, replayed) -> None:
+@pytest.fixture
+def asking(recording, replayed) -> Any:
+    """A run that comes to ask for an approval, which nobody gives at the terminal."""
     rig = replayed(recording.until(events.Proposed)[:-1], acceptance__approval="ask")
     object.__setattr__(rig.performer, "operator", SilentOperator())
-    ended = await rig.run(when_asked(rig, Answer("a name")))
-    assert ended.exit_code == ExitCode.DONE
-    assert events.Committed(approved_by="a name") in read_journal(rig.folder.journal)
+    return rig
+
+
+async def run_giving(rig: Any, command: Any) -> events.Ended:
+    """Run, and give a command as soon as a question is open."""
+
+    def give(status: Status) -> None:
+        if status is Status.AWAITING_OPERATOR:
+            rig.engine.queue.put(command)
+
+    ended: events.Ended = await rig.run(
+        on(events.StepBegun, lambda: rig.engine.commands.watchers.append(give))
+    )
+    return ended
+
+
+async def test_a_question_may_be_answered_by_command(asking) -> None:
+    assert (await run_giving(asking, Answer("a name"))).exit_code == ExitCode.DONE
+    assert events.Committed(approved_by="a name") in read_journal(asking.folder.journal)
 
 
 @pytest.mark.parametrize("command", [Stop(), Abort()])
-async def test_a_run_that_waits_for_an_answer_can_be_ended(recording, replayed, command) -> None:
-    rig = replayed(recording.until(events.Proposed)[:-1], acceptance__approval="ask")
-    object.__setattr__(rig.performer, "operator", SilentOperator())
+async def test_a_run_that_waits_for_an_answer_can_be_ended(recording, asking, command) -> None:
     with pytest.raises(Interruption):
-        await rig.run(when_asked(rig, command))
-    assert rig.config == recording.config_before
+        await run_giving(asking, command)
+    assert asking.config == recording.config_before

@@ -36,9 +36,11 @@ def startup(make_rig: Any) -> Any:
     return make
 
 
-async def test_what_the_cell_file_states_is_done_without_asking(startup) -> None:
+@pytest.mark.parametrize("state", [NEW, apply(fold([ESTOP]), ARRIVED)], ids=["new", "moved again"])
+async def test_what_the_cell_file_states_is_done_without_asking(startup, state: RunState) -> None:
+    """Also after an emergency stop that is over, as the robot has moved since."""
     starting, bench = startup(EVERYTHING, UnattendedOperator(), COLD)
-    await starting.prepare(NEW)
+    await starting.prepare(state)
     assert bench.controller.log == ["prepare", *DONE]
 
 
@@ -115,12 +117,6 @@ async def test_it_is_not_reset_on_resuming_either(startup, needed) -> None:
     with pytest.raises(AnswerNeeded, match="reset it at the controller"):
         await starting.prepare(stopped)
     assert bench.controller.log == ["prepare"]
-
-
-async def test_once_the_robot_moved_again_the_earlier_emergency_stop_is_over(startup) -> None:
-    starting, bench = startup(EVERYTHING, UnattendedOperator(), COLD)
-    await starting.prepare(apply(fold([ESTOP]), ARRIVED))
-    assert bench.controller.log == ["prepare", *DONE]
 
 
 async def test_a_preparation_that_failed_may_have_reset_it(startup) -> None:

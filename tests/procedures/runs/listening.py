@@ -11,7 +11,7 @@ from drivers.errors import GaugeSilent
 from hexacell.cell.recovery import Escalations, RecoverySettings
 from hexacell.errors import Interruption
 from hexacell.verdict.acceptance_gates import AcceptanceGate
-from procedures.engine.commands import Stop
+from procedures.engine.commands import Abort, Stop
 from procedures.engine.recovery import GIVE_UP
 from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase, SetKey
@@ -81,6 +81,31 @@ async def run_until(
     enough = on(kind, lambda: rig.engine.queue.put(Stop()), count)
     with pytest.raises(Interruption):
         await rig.run(*listeners, enough, policy=policy)
+
+
+async def ended_by_command(rig: Any, number: int) -> bool:
+    """Run until somebody aborts at an event; whether it came to that."""
+    try:
+        await rig.run(on(object, lambda: rig.engine.queue.put(Abort()), number))
+    except Interruption:
+        return True
+    return False
+
+
+async def ended_by_power_cut(rig: Any, number: int) -> bool:
+    """Run until the process dies at an event: its journal ends there."""
+    path, kept = rig.folder.journal, list[bytes]()
+
+    def die() -> None:
+        kept.append(path.read_bytes())
+        raise PowerCut
+
+    try:
+        await rig.run(on(object, die, number))
+    except PowerCut:
+        path.write_bytes(kept[0])  # as if the engine had not got to say that it was interrupted
+        return True
+    return False
 
 
 def happened(rig: Any, kind: type[Any]) -> list[Any]:

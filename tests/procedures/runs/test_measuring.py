@@ -4,7 +4,6 @@ from typing import Any
 
 import pytest
 
-from drivers.errors import GaugeAtEnd
 from hexacell.cell.recovery import Action
 from hexacell.errors import AnswerNeeded, ExitCode, LimitError
 from hexacell.kinematics.pose import Pose
@@ -12,25 +11,7 @@ from procedures.engine.commands import UnattendedOperator
 from procedures.run.trips import Guard, GuardTripped
 from procedures.steps import events
 from procedures.steps.move import Move
-from tests.procedures.runs.listening import at_step, happened, on, run_until
-
-
-async def test_after_a_rejected_record_another_pose_is_measured(make_rig) -> None:
-    rig = make_rig()
-    at_ends = [GaugeAtEnd("is at an end of its travel", subject=f"gauge {name}") for name in "xy"]
-
-    def once() -> None:
-        for gauge in rig.gauges[: len(at_ends)]:
-            gauge.failures.append(at_ends.pop(0))
-
-    await run_until(rig, events.SetClosed, at_step("P1/o03/sample", once))
-    (refused,) = happened(rig, events.RecordRejected)
-    assert (str(refused.at), refused.orientation) == ("P1", 3)
-    begun = [event.step for event in happened(rig, events.StepBegun)]
-    first, second = (step.pose for step in begun if step.key == "P1/o03/move")
-    assert first != second
-    taken = next(event for event in happened(rig, events.RecordTaken) if event.orientation == 3)
-    assert taken.pose == second
+from tests.procedures.runs.listening import happened, on, run_until
 
 
 async def test_a_slipped_gauge_stops_the_run_and_the_point_is_measured_again(recording, replayed) -> None:
@@ -62,12 +43,6 @@ async def test_a_slipped_encoder_is_named_at_the_end_of_its_set(
     assert rig.controller.log[-1] == "stop"
     await run_until(rig, events.SetClosed)
     assert [str(event.at) for event in happened(rig, events.SetInvalidated)] == ["P2"]
-
-
-async def test_gauges_placed_by_hand_are_requested_at_every_point(recording, replayed) -> None:
-    rig = replayed(recording.until(events.SetClosed, count=2), stations__placement="by-hand")
-    await rig.run()
-    assert rig.operator.placed == [1, 2, 1, 2]
 
 
 async def test_an_unattended_run_with_gauges_placed_by_hand_ends(make_rig) -> None:

@@ -12,7 +12,7 @@ from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.cell.recovery import UnattendedRecovery
 from hexacell.errors import Interruption
 from hexacell.kinematics.pose import Pose
-from procedures.engine.commands import Abort, Stop
+from procedures.engine.commands import Stop
 from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
@@ -24,7 +24,14 @@ from procedures.steps.repeat import Repeat
 from procedures.steps.standstill import Standstill
 from procedures.workflow.sets import SetSteps
 from tests.procedures.rig import MakeRig, Rig, new_rig
-from tests.procedures.runs.listening import PowerCut, happened, on, run_until, steps_of
+from tests.procedures.runs.listening import (
+    ended_by_command,
+    ended_by_power_cut,
+    happened,
+    on,
+    run_until,
+    steps_of,
+)
 from tests.small_cell import choose_among_few
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
@@ -187,39 +194,25 @@ async def test_records_are_means_of_several_windows_where_that_is_allowed_and_pa
 
 
 @pytest.mark.parametrize(
-    ("command", "step"),
-    [(Abort(), 56), *(pytest.param(one, 3, marks=pytest.mark.slow) for one in (Abort(), None))],
+    ("end", "step"),
+    [
+        (ended_by_command, 56),
+        *(pytest.param(one, 3, marks=pytest.mark.slow) for one in (ended_by_command, ended_by_power_cut)),
+    ],
 )
-async def test_interrupted_anywhere_it_is_measured_once(make_rig, few_candidates, tmp_path, command, step):
+async def test_interrupted_anywhere_it_is_measured_once(make_rig, few_candidates, tmp_path, end, step):
     """After a stop, and after a death that leaves no word, at some events until the noise is measured."""
     for number in range(step, 110, 2 * step):
         folder = tmp_path / f"{number}"
         folder.mkdir()
         rig = new_rig(folder, **ASKED)
-        await interrupted(rig, number, command)
+        assert await end(rig, number)
         await measure_noise(rig)
         state = fold(read_journal(rig.folder.journal))
         assert len(state.set(P1).samples) == 2
         assert state.noise is not None
         assert state.noise.noise.approaches is not None
         assert state.noise.noise.approaches.visits == 7
-
-
-async def interrupted(rig: Rig, number: int, command: Abort | None) -> None:
-    heard, kept = [0], [b""]
-
-    def listener(event: events.Event, _: RunState) -> None:
-        heard[0] += 1
-        if heard[0] == number and command is not None:
-            rig.engine.queue.put(command)
-        elif heard[0] == number:
-            kept[0] = rig.folder.journal.read_bytes()
-            raise PowerCut
-
-    with pytest.raises((Interruption, PowerCut)):
-        await rig.run(listener)
-    if command is None:
-        rig.folder.journal.write_bytes(kept[0])
 
 
 FAILING = (Standstill, Pilot, Repeat)

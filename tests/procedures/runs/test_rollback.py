@@ -181,15 +181,6 @@ async def test_a_config_edited_during_the_run_is_not_overwritten(recording, repl
     assert "reload" not in rig.controller.log
 
 
-async def test_a_rollback_does_not_overwrite_an_edited_config(recording, replayed) -> None:
-    rig = replayed(listening.with_tiny_deviations_before(recording.until(events.Proposed)), **CLEARLY_WORSE)
-    edited: list[bytes] = []
-    edit = listening.on(events.ResultValidated, lambda: edited.append(listening.somebody_edits(rig)))
-    with pytest.raises(FileError, match="changed since it was written"):
-        await rig.run(edit)
-    assert [rig.config] == edited
-
-
 async def test_an_interrupted_rollback_is_finished_on_resuming(recording, replayed) -> None:
     rig = replayed(listening.with_tiny_deviations_before(recording.until(events.Proposed)), **CLEARLY_WORSE)
     broken = DeviceError("does not come back", subject="controller")

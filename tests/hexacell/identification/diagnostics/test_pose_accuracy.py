@@ -36,6 +36,12 @@ def task():
     return [Pose(50.0, -50.0, 550.0, 5.0, 5.0, 0.0), Pose(-50.0, 80.0, 500.0, 0.0, -10.0, 10.0)]
 
 
+@pytest.fixture
+def stated(identified, paper, workspace, task):
+    machine, at = (identified, paper.nominal, paper.branch), PoseBatch.of(workspace)
+    return accuracy_of(*machine, task=PoseBatch.of(task), workspace=at)
+
+
 def errors_after_teaching(reached, commanded, taught_on, length):
     """Errors (n, 2) in mm and rad, frames chosen by scipy's least squares on some rows."""
     positions, turns = reached[:, :3], Rotation.from_rotvec(reached[:, 3:])
@@ -57,16 +63,14 @@ def errors_after_teaching(reached, commanded, taught_on, length):
 
 
 def test_before_is_what_a_machine_like_the_estimate_does(
-    identified, paper, reach, vector_of, workspace, task
+    identified, paper, reach, vector_of, workspace, task, stated
 ):
     commands = [*workspace, *task]
     reached = np.array([reach(identified.geometry, paper.nominal, pose)[1] for pose in commands])
     radius = np.linalg.norm(identified.geometry["B"], axis=1).mean()
     rows = slice(0, len(workspace))
     left = errors_after_teaching(reached, np.array([vector_of(p) for p in commands]), rows, radius)
-    found = accuracy_of(
-        identified, paper.nominal, paper.branch, task=PoseBatch.of(task), workspace=PoseBatch.of(workspace)
-    )
+    found = stated
     np.testing.assert_allclose(found.before.distances_mm, left[-2:, 0], rtol=1e-5)
     np.testing.assert_allclose(found.before.angles, left[-2:, 1], rtol=1e-5)
     assert found.before.position_largest_mm == pytest.approx(left[-2:, 0].max(), rel=1e-5)
@@ -75,7 +79,7 @@ def test_before_is_what_a_machine_like_the_estimate_does(
 
 
 def test_after_is_the_scatter_of_machines_that_the_covariance_allows(
-    identified, paper, legs, vector_of, workspace, task
+    identified, legs, vector_of, workspace, task, stated
 ):
     commands = np.array([vector_of(pose) for pose in [*workspace, *task]])
     joints = [legs(identified.geometry).joints(command) for command in commands]
@@ -88,9 +92,7 @@ def test_after_is_the_scatter_of_machines_that_the_covariance_allows(
         reached = np.array([machine.closed(q, near) for q, near in zip(joints, commands, strict=True)])
         left = errors_after_teaching(reached, commands, slice(0, len(workspace)), radius)
         squares.append(np.mean(left[-2:] ** 2, axis=0))
-    found = accuracy_of(
-        identified, paper.nominal, paper.branch, task=PoseBatch.of(task), workspace=PoseBatch.of(workspace)
-    )
+    found = stated
     told = np.array([np.mean(found.after.distances_mm**2), np.mean(found.after.angles**2)])
     standard_error = np.std(squares, axis=0, ddof=1) / np.sqrt(DRAWS)
     assert (np.abs(np.mean(squares, axis=0) - told) < 4.0 * standard_error).all()

@@ -74,14 +74,11 @@ def test_what_was_known_under_another_geometry_does_not_count(hexaglide, assumpt
     assert_same(another.problem(every, known=known), another.problem(every))
 
 
-def test_one_point_is_refused_however_many_records_it_has(visit, make_problem):
+def test_one_point_is_refused_however_many_records_it_has_and_no_records(visit, make_problem):
     exact = visit(points=1, orientations=40, seed=0)
     with pytest.raises(IdentifiabilityError, match=r"one point.* 35 parameters.*two points") as caught:
         identify(make_problem(exact.measured()))
     assert caught.value.exit_code is ExitCode.OUT_OF_LIMITS
-
-
-def test_no_records_are_refused(make_problem):
     with pytest.raises(IdentifiabilityError, match="two points"):
         identify(make_problem(MeasurementSet(())))
 

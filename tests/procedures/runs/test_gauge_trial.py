@@ -117,7 +117,7 @@ async def test_without_a_person_a_gauge_off_its_middle_ends_the_run_in_words(mak
 )
 async def test_a_person_is_told_what_to_do_and_the_station_begins_again(make_rig, is_exchanged, words):
     rig = make_rig(stations__placement="by-hand", **({"stations__trial_mm": 1.0} if is_exchanged else {}))
-    correct = partial(corrected, rig)
+    correct: Callable[[], None] = partial(corrected, rig)
     if is_exchanged:
         make_mistake(rig, "x and y exchanged")
     else:

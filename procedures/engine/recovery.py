@@ -21,13 +21,8 @@ from procedures.run.questions import ask_recovery
 from procedures.run.state import RunState
 from procedures.run.trips import Guard, GuardTripped, RobotNotStopped, causes_of, may_still_move
 from procedures.steps import events
-from procedures.steps.base import BaseEvent, BaseStep, StepOfSet
-from procedures.steps.commit import Committed
-from procedures.steps.events import Step
-from procedures.steps.lend import ProvisionalApplied
+from procedures.steps.base import StepOfSet
 from procedures.steps.place import MountingError
-from procedures.steps.roll_back import RollBack
-from procedures.steps.take_back import TakeBack
 from procedures.workflow.next_step import StepExecutor
 from procedures.workflow.sets import NoSafePath, TravelError
 
@@ -84,7 +79,7 @@ GIVE_UP = Escalations()
 
 
 def failed(
-    policy: Escalations, error: errors.HexacellError, step: Step | None, state: RunState
+    policy: Escalations, error: errors.HexacellError, step: events.Step | None, state: RunState
 ) -> events.Failed:
     """The event of a failure; of several at once, the one with the most severe action decides."""
     failures: list[events.Failed] = []
@@ -125,7 +120,7 @@ class Recovery:
     halt: Callable[[], Awaitable[errors.HexacellError | None]]
     record: Callable[[events.Event], RunState]
 
-    async def recover(self, error: errors.HexacellError, step: Step | None, state: RunState) -> None:
+    async def recover(self, error: errors.HexacellError, step: events.Step | None, state: RunState) -> None:
         """Return when the next step may be decided; raises the error that ends the run otherwise.
 
         A failure meanwhile is a failure of its own.
@@ -198,13 +193,13 @@ class Reversal:
         is_recorded: whether the step is journalled, as any other is.
     """
 
-    step: BaseStep
+    step: events.BaseStep
     failure: str
     is_recorded: bool = True
 
     def undone(self, error: BaseException) -> BaseException:
         """The error to report once it is reverted: of a written result, that it was undone, and why."""
-        is_result = isinstance(self.step, RollBack) and (self.is_recorded or is_evidence_lost(error))
+        is_result = isinstance(self.step, events.RollBack) and (self.is_recorded or is_evidence_lost(error))
         if not is_result or not isinstance(error, errors.HexacellError) or may_still_move(error):
             return error
         undone = "the new geometry was written and could not be verified; the old config is back."
@@ -219,13 +214,13 @@ class Reversal:
         return errors.SeveralErrors(self.failure, [cause, error])
 
 
-def revert_unrecorded(event: BaseEvent, state: RunState) -> Reversal | None:
+def revert_unrecorded(event: events.BaseEvent, state: RunState) -> Reversal | None:
     """What to revert if an event could not be journalled; ``state`` is the one without it."""
     failure = "the controller has {}, which could be neither noted nor taken back"
-    if isinstance(event, Committed) and state.committed is None:
-        return Reversal(RollBack(), failure.format("the new geometry"), is_recorded=False)
-    if isinstance(event, ProvisionalApplied) and not state.provisional_active:
-        return Reversal(TakeBack(), failure.format("a provisional geometry"), is_recorded=False)
+    if isinstance(event, events.Committed) and state.committed is None:
+        return Reversal(events.RollBack(), failure.format("the new geometry"), is_recorded=False)
+    if isinstance(event, events.ProvisionalApplied) and not state.provisional_active:
+        return Reversal(events.TakeBack(), failure.format("a provisional geometry"), is_recorded=False)
     return None
 
 
@@ -241,8 +236,8 @@ def revert_at_end(state: RunState, error: BaseException) -> Reversal | None:
     is_failure = isinstance(error, errors.HexacellError) and not isinstance(error, errors.Interruption)
     if is_failure and state.is_unverified:
         failure = "the new geometry was not verified, and could not be taken back"
-        return Reversal(RollBack(), failure, is_recorded)
+        return Reversal(events.RollBack(), failure, is_recorded)
     is_at_reference = state.at_pose is not None and state.at_pose[1] == 1
     if state.config_write_pending or (state.provisional_active and is_at_reference):
-        return Reversal(TakeBack(), "", is_recorded)
+        return Reversal(events.TakeBack(), "", is_recorded)
     return None

@@ -19,15 +19,7 @@ from procedures.calibration.calibration import Calibration, Mode
 from procedures.resources.run_resources import RunResources
 from procedures.run.keys import Phase
 from procedures.run.state import RunState
-from procedures.steps.accept import Accept
-from procedures.steps.base import BaseEvent, BaseStep
-from procedures.steps.commit import Commit
-from procedures.steps.identify import Identify
-from procedures.steps.judge import Judge, ResultValidated
-from procedures.steps.move import Move
-from procedures.steps.propose import Propose
-from procedures.steps.roll_back import RollBack
-from procedures.steps.take_back import TakeBack
+from procedures.steps import events
 from procedures.workflow.held_out import HeldOutSteps
 from procedures.workflow.length import LengthSteps
 from procedures.workflow.points import IdentificationSteps, NoiseSteps
@@ -38,11 +30,11 @@ from procedures.workflow.sets import SetSteps
 class StepExecutor(RunResources):
     """The resources of a run, with which its steps are carried out."""
 
-    def next_step(self, state: RunState) -> BaseStep | None:
+    def next_step(self, state: RunState) -> events.BaseStep | None:
         """The step to carry out; None if the run is over. Raises ``HexacellError`` if none is possible."""
         return next_step(self.calibration, state)
 
-    async def perform(self, step: BaseStep, state: RunState) -> BaseEvent:
+    async def perform(self, step: events.BaseStep, state: RunState) -> events.BaseEvent:
         """Carry out one step; raises ``HexacellError``."""
         if not step.moves_nothing:
             await self.require_unedited_config(state)
@@ -50,29 +42,29 @@ class StepExecutor(RunResources):
         return await step.perform(self, state)
 
 
-def next_step(calibration: Calibration, state: RunState) -> BaseStep | None:
+def next_step(calibration: Calibration, state: RunState) -> events.BaseStep | None:
     """The step to execute; None if the run is over. Raises ``HexacellError`` if none is possible."""
     if state.ended is not None:
         return None
     if state.config_write_pending:
-        return TakeBack()
+        return events.TakeBack()
     known = calibration.known(state)
     measuring = Measuring(known.measuring, known.allowances)
     step = _decided(calibration, measuring, state)
-    return measuring.from_one_side(step, state) if isinstance(step, Move) else step
+    return measuring.from_one_side(step, state) if isinstance(step, events.Move) else step
 
 
-def _decided(calibration: Calibration, measuring: "Measuring", state: RunState) -> BaseStep | None:
+def _decided(calibration: Calibration, measuring: "Measuring", state: RunState) -> events.BaseStep | None:
     """The step to execute, where a move goes straight to its end."""
     if state.recalled is not None:
         return _way_back(measuring, state)
     if calibration.mode in {Mode.LENGTH, Mode.CHECK}:
         is_length = calibration.mode is Mode.LENGTH
         measure = measuring.length_step if is_length else measuring.points.next_step
-        return None if state.judged else measure(state) or Judge()
+        return None if state.judged else measure(state) or events.Judge()
     if state.identified is None:
         step = measuring.points.next_step(state)
-        return step or (TakeBack() if state.provisional_active else Identify())
+        return step or (events.TakeBack() if state.provisional_active else events.Identify())
     before = measuring.held_out.next_step(state, Phase.BEFORE)
     return before or _write_back(measuring, state, has_length_check=calibration.length_check)
 
@@ -94,11 +86,11 @@ class Measuring:
         fixture = settings.length_check
         self.length = None if fixture is None else LengthSteps(fixture, sets)
 
-    def length_step(self, state: RunState) -> BaseStep | None:
+    def length_step(self, state: RunState) -> events.BaseStep | None:
         """The next step of the length check; None when it is done."""
         return None if self.length is None else self.length.next_step(state)
 
-    def from_one_side(self, move: Move, state: RunState) -> Move:
+    def from_one_side(self, move: events.Move, state: RunState) -> events.Move:
         """The move over its waypoint, which is checked as the move itself is, or straight without one.
 
         From which side the joints then arrived is known from the path.
@@ -122,7 +114,7 @@ def length_poses(calibration: Calibration) -> tuple[tuple[str, Pose], ...]:
     return steps.planned_poses() if is_wanted and steps is not None else ()
 
 
-def _way_back(measuring: Measuring, state: RunState) -> BaseStep | None:
+def _way_back(measuring: Measuring, state: RunState) -> events.BaseStep | None:
     """The next move back to the reference of the set in which the robot is; None where there is none.
 
     Such is a robot that is there, is in no set, is lost, or finds no safe path.
@@ -139,25 +131,25 @@ def _way_back(measuring: Measuring, state: RunState) -> BaseStep | None:
         return None
 
 
-def _write_back(measuring: Measuring, state: RunState, *, has_length_check: bool) -> BaseStep | None:
+def _write_back(measuring: Measuring, state: RunState, *, has_length_check: bool) -> events.BaseStep | None:
     """The next step once the held-out points are measured for the first time."""
     if state.proposed is None:
-        return Propose()
+        return events.Propose()
     if state.judged is not None:
         return _after_verdict(state, state.judged)
     if state.rolling_back:
-        return RollBack()
+        return events.RollBack()
     if state.committed is None:
-        return Commit()
+        return events.Commit()
     step = measuring.held_out.next_step(state, Phase.AFTER)
     if step is None and has_length_check:
         step = measuring.length_step(state)
     if step is None and state.confirmation is not None:
         step = measuring.held_out.next_step(state, Phase.CONFIRM)
-    return step or Judge()
+    return step or events.Judge()
 
 
-def _after_verdict(state: RunState, judged: ResultValidated) -> BaseStep | None:
+def _after_verdict(state: RunState, judged: events.ResultValidated) -> events.BaseStep | None:
     """What follows a verdict on a written geometry: it stays, or a person decides, or it is rolled back."""
     verification = judged.verification
     stays = judged.verdict is Verdict.PASS or (verification is not None and verification.is_kept)
@@ -165,6 +157,6 @@ def _after_verdict(state: RunState, judged: ResultValidated) -> BaseStep | None:
         return None
     is_offered = verification is not None and verification.is_offered
     if is_offered and state.accepted is None and not state.rolling_back:
-        return Accept()
+        return events.Accept()
     is_kept = state.accepted is not None and state.accepted.by is not None
-    return None if is_kept else RollBack()
+    return None if is_kept else events.RollBack()

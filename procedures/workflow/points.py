@@ -18,15 +18,7 @@ from procedures.calibration.calibration import campaign_state
 from procedures.calibration.repeatability import noise_readings
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState
-from procedures.steps.assess_noise import AssessNoise
-from procedures.steps.close import CloseSet
-from procedures.steps.events import Step
-from procedures.steps.lend import Lend
-from procedures.steps.locate import Locate
-from procedures.steps.move import Move
-from procedures.steps.pilot import Pilot
-from procedures.steps.repeat import Repeat
-from procedures.steps.standstill import Standstill
+from procedures.steps import events
 from procedures.workflow.sets import Known, SetSteps, beside, move_to_chosen, reference_pose, require_zero
 
 DISTANCE_SHARE = 0.3
@@ -40,7 +32,7 @@ class NoiseSteps:
     plan: Plan
     sets: SetSteps
 
-    def next_step(self, state: RunState, key: SetKey, known: Known | None) -> Step | None:
+    def next_step(self, state: RunState, key: SetKey, known: Known | None) -> events.Step | None:
         """The next step at the open set; None if the noise is measured, or not to be.
 
         ``known`` is the robot, and where the ball was when the gauges were zeroed, if that is known.
@@ -53,22 +45,22 @@ class NoiseSteps:
         if state.at_pose != (key, 1):
             return self._away(state, key) or self.sets.way_back(state, key, known)
         if measured.has_left:
-            return Repeat(at=key)
+            return events.Repeat(at=key)
         if wanted.standstill_readings and measured.standstill is None:
-            return Standstill(at=key)
-        return self._leave(state, key, known) or AssessNoise()
+            return events.Standstill(at=key)
+        return self._leave(state, key, known) or events.AssessNoise()
 
-    def _away(self, state: RunState, key: SetKey) -> Step | None:
+    def _away(self, state: RunState, key: SetKey) -> events.Step | None:
         """What is left to do before the robot returns to the reference; None if nothing is."""
         measured = state.set(key)
         if measured.piloted == self.plan.pilots_per_departure or not measured.has_left:
             return None
         orientation = FIRST_PILOT + len(measured.pilots)
         if state.at_pose == (key, orientation) and state.target is not None:
-            return Pilot(at=key, orientation=orientation, pose=state.target)
+            return events.Pilot(at=key, orientation=orientation, pose=state.target)
         return self._to_pilot(state, key)
 
-    def _to_pilot(self, state: RunState, key: SetKey) -> Move | None:
+    def _to_pilot(self, state: RunState, key: SetKey) -> events.Move | None:
         """The next move to the next pilot pose; None if there is none, or the visits do not repeat.
 
         A robot that shows other places each time it is at one is not known by what it shows.
@@ -79,7 +71,7 @@ class NoiseSteps:
         pilot = self.plan.pilot_pose(campaign_state(state, key))
         return None if pilot is None else move_to_chosen(state, pilot)
 
-    def _leave(self, state: RunState, key: SetKey, known: Known | None) -> Move | None:
+    def _leave(self, state: RunState, key: SetKey, known: Known | None) -> events.Move | None:
         """The move away from the reference before its next visit; None after the last one."""
         done = len(state.set(key).visits)
         if done >= self.plan.settings.noise.revisits:
@@ -97,7 +89,7 @@ class NoiseSteps:
         for belief, ball in (*beliefs, (drawn, None)):
             clear = [pose for pose in poses if self.sets.is_clear_both_ways(belief, reference, pose, ball)]
             if clear:
-                return Move(at=key, orientation=0, pose=clear[done % len(clear)])
+                return events.Move(at=key, orientation=0, pose=clear[done % len(clear)])
         return None
 
 
@@ -109,7 +101,7 @@ class IdentificationSteps:
     sets: SetSteps
     noise: NoiseSteps
 
-    def next_step(self, state: RunState) -> Step | None:
+    def next_step(self, state: RunState) -> events.Step | None:
         """The next step; None if nothing more is to be measured."""
         key = open_set(state)
         if key is not None and (step := self._in_set(state, key)):
@@ -117,10 +109,10 @@ class IdentificationSteps:
         match self.plan.decide(campaign_state(state, key)):
             case StartPoint() as start:
                 if self._applies_provisional(state):
-                    return Lend()
+                    return events.Lend()
                 at = SetKey(phase=Phase.IDENTIFY, point=start.point)
-                move = Move(at=at, orientation=1, pose=start.pose.as_tuple())
-                return Locate() if state.position_unknown else self.sets.towards(state, move)
+                move = events.Move(at=at, orientation=1, pose=start.pose.as_tuple())
+                return events.Locate() if state.position_unknown else self.sets.towards(state, move)
             case MeasurePose() as pose:
                 return move_to_chosen(state, pose)
             case FinishPoint() as finish:
@@ -128,11 +120,11 @@ class IdentificationSteps:
             case _:
                 return None
 
-    def _in_set(self, state: RunState, key: SetKey) -> Step | None:
+    def _in_set(self, state: RunState, key: SetKey) -> events.Step | None:
         """What an open set needs before a new pose is chosen for it."""
         measured = state.set(key)
         if state.position_unknown:
-            return Locate()
+            return events.Locate()
         require_zero(state, key)
         known = self._known(state, key)
         ball = None if known is None else known[1].reference
@@ -145,7 +137,7 @@ class IdentificationSteps:
             return step
         if orientation is None or pose is None:
             return None
-        return self.sets.towards(state, Move(at=key, orientation=orientation, pose=pose), ball)
+        return self.sets.towards(state, events.Move(at=key, orientation=orientation, pose=pose), ball)
 
     def _applies_provisional(self, state: RunState) -> bool:
         """Whether the controller gets a provisional geometry now, between two points."""
@@ -154,16 +146,16 @@ class IdentificationSteps:
             return False
         return self.plan.allows_provisional(campaign_state(state, None))
 
-    def _finish_point(self, state: RunState, finish: FinishPoint) -> Step:
+    def _finish_point(self, state: RunState, finish: FinishPoint) -> events.Step:
         key = SetKey(phase=Phase.IDENTIFY, point=finish.point)
         if step := self.sets.at_reference(state, key):
             is_short = len(state.set(key).samples) < self.plan.records_at(finish.point)
-            is_last = isinstance(step, CloseSet) and is_short
+            is_last = isinstance(step, events.CloseSet) and is_short
             return step.model_copy(update={"reason": finish.reason}) if is_last else step
         # Also at a waypoint of the path back: a new plan could return to where the robot came from.
         return self.way_back(state, key)
 
-    def way_back(self, state: RunState, key: SetKey) -> Step:
+    def way_back(self, state: RunState, key: SetKey) -> events.Step:
         """The next move to the reference of a set; raises ``HexacellError`` if no safe path leads there."""
         return self.sets.way_back(state, key, self._known(state, key))
 

@@ -112,21 +112,17 @@ def is_link_local(host: str, *, by_name: bool) -> bool:
 
 def connect_to_no_link_local() -> None:
     """From now on this thread connects to no such address, whatever a name resolved to before."""
-    _watch_connections()
+    # By a hook, since the libraries that connect resolve names themselves; it cannot be taken away.
+    _add_hook_once(_require_elsewhere)
     _of_thread.is_watched = True
 
 
 _of_thread = threading.local()
-
-
-@cache
-def _watch_connections() -> None:
-    # By a hook, since the libraries that connect resolve names themselves; it cannot be taken away.
-    sys.addaudithook(_require_elsewhere)
+_add_hook_once = cache(sys.addaudithook)
 
 
 def _require_elsewhere(event: str, arguments: tuple[object, ...]) -> None:
-    if event == "socket.connect" and getattr(_of_thread, "is_watched", False):
+    if event == "socket.connect" and hasattr(_of_thread, "is_watched"):
         match arguments:
             case (_, (str(host), *_)) if is_link_local(host, by_name=True):
                 raise PermissionError(LINK_LOCAL)

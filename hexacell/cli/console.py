@@ -80,20 +80,23 @@ def _losses_noted(stream: TextIO) -> Iterator[None]:
         # A run goes on without its output; the command as a whole is not done.
         if not isinstance(error, BrokenPipeError):
             _lost.append(error)
-        _discard_rest(stream)
+        # Python flushes the rest of the buffer when it ends, which must not fail again.
+        with Path(os.devnull).open("wb") as null:
+            os.dup2(null.fileno(), stream.fileno())
 
 
+@dataclass(frozen=True, slots=True)
 class _Handed:
     """A stream like another one, that hands what is written to a thread."""
 
-    def __init__(self, stream: TextIO, texts: SimpleQueue[tuple[TextIO, str] | None]) -> None:
-        self._stream, self._texts = stream, texts
+    stream: TextIO
+    texts: SimpleQueue[tuple[TextIO, str] | None]
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any attribute of the other
-        return getattr(self._stream, name)
+        return getattr(self.stream, name)
 
     def write(self, text: str) -> int:
-        self._texts.put((self._stream, text))
+        self.texts.put((self.stream, text))
         return len(text)
 
     def flush(self) -> None:
@@ -106,22 +109,22 @@ def unhindered_output() -> Iterator[None]:
 
     Only the end of the context waits until all is read.
     """
-    texts: SimpleQueue[tuple[TextIO, str] | None] = SimpleQueue()
-    out, err = (one and _Handed(one, texts) for one in (sys.stdout, sys.stderr))
-    writer = Thread(target=_write_all, args=(texts,), name="output", daemon=True)
+    texts = SimpleQueue[tuple[TextIO, str] | None]()
+
+    def write_all() -> None:
+        for stream, text in iter(texts.get, None):
+            with _losses_noted(stream):
+                _write_whole(stream, text)
+
+    writer = Thread(target=write_all, name="output", daemon=True)
     writer.start()
+    out, err = (one and _Handed(one, texts) for one in (sys.stdout, sys.stderr))
     try:
         with redirect_stdout(out), redirect_stderr(err):
             yield
     finally:
         texts.put(None)
         writer.join()
-
-
-def _write_all(texts: SimpleQueue[tuple[TextIO, str] | None]) -> None:
-    for stream, text in iter(texts.get, None):
-        with _losses_noted(stream):
-            _write_whole(stream, text)
 
 
 def _write_whole(stream: TextIO, text: str) -> None:
@@ -145,10 +148,3 @@ def lost_output() -> OSError | None:
 
 
 _lost: list[OSError] = []
-
-
-def _discard_rest(stream: TextIO) -> None:
-    """Python flushes the rest of the buffer when it ends, which must not fail again."""
-    null = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(null, stream.fileno())
-    os.close(null)

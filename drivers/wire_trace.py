@@ -89,8 +89,7 @@ class WireTrace:
         """Keep ``entry``; the oldest entries of its line are dropped if necessary."""
         with self._lock:
             self._count += 1
-            line = self._lines.setdefault(entry.line, _LineTrace(self._capacity))
-            line.add(self._count, entry)
+            self._lines.setdefault(entry.line, _LineTrace(self._capacity)).add(self._count, entry)
 
     @property
     def dropped(self) -> dict[str, int]:

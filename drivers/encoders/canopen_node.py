@@ -168,8 +168,7 @@ def explained(error: SilentNodeError, nodes: Sequence[EncoderNode], bus: Encoder
     named = [node.leg for node in nodes if node.leg.number in error.legs]
     silent = [node.leg for node in nodes if not node.sdo.has_responded]
     if len(silent) == len(nodes):
-        what = f"{error.problem}; no encoder answers{bus.reported}"
-        return silent_nodes(what, silent, THE_BUS)
+        return silent_nodes(f"{error.problem}; no encoder answers{bus.reported}", silent, THE_BUS)
     if set(named) & set(silent):
         return silent_nodes(f"{error.problem}; the others answer", silent)
     remedy = THE_BUS if len(named) == len(nodes) else "Check its supply for a dip, timeout_s, heartbeat_ms"

@@ -185,8 +185,7 @@ class SyncSampler:
                 self.bus.listen(LATE_RESPONSE_TIMEOUTS * self.timeout_s)
             return self._received()
         silent = [leg for leg, left in zip(self.legs, self._outstanding, strict=True) if left > 0]
-        what = f"no response to SYNC within {self.timeout_s:g} s, {MAX_SYNCS} times"
-        raise silent_nodes(what, silent)
+        raise silent_nodes(f"no response to SYNC within {self.timeout_s:g} s, {MAX_SYNCS} times", silent)
 
     def check(self) -> None:
         """Raise if a leg sent more positions than there were SYNCs, or another master commands them."""
@@ -207,9 +206,8 @@ class SyncSampler:
         counts = tuple(count for count in self._counts if count is not None)
         if len(counts) < len(self._counts):
             index = self._counts.index(None)
-            needed = self.channels[index].length
             raise DeviceError(
-                f"sent {self._lengths[index]} bytes where its position needs {needed}",
+                f"sent {self._lengths[index]} bytes where its position needs {self.channels[index].length}",
                 subject=self.legs[index].subject,
                 action="Open the encoders again; if it stays so, use another device",
             )

@@ -148,8 +148,7 @@ MIDDLE_OF = 3
 
 def decimals_of(resolution_mm: float) -> int:
     """The decimals of a display in mm with this resolution: 3 for 0.001 and for 0.005."""
-    exponent = Decimal(str(resolution_mm)).normalize().as_tuple().exponent
-    return max(0, -int(exponent))
+    return max(0, -int(Decimal(str(resolution_mm)).normalize().as_tuple().exponent))
 
 
 class DisplayHistory:

@@ -133,8 +133,7 @@ class FollowingPhysics(RobotPhysics):
     def _keep_gauges(self, station: Array, triad: Array) -> None:
         with suppress(FileError):  # a folder that cannot be written is no reason to have no gauges
             places = {"station": station.tolist(), "triad": triad.tolist()}
-            kept = {"config": fingerprint(*self._config), **places}
-            write_own(self._kept, json.dumps(kept).encode())
+            write_own(self._kept, json.dumps({"config": fingerprint(*self._config), **places}).encode())
 
     def encoder_positions(self) -> Array:
         with self._lock:

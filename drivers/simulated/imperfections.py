@@ -138,5 +138,4 @@ def with_longer_legs(
     if lengths:
         changes = parameters.changes(lengths[0].symbol, longer[:, None])[:, 0]
         return Geometry(parameters, geometry.vector + changes), joints
-    by_joints = mechanism.derivatives(geometry, poses, joints).joints
-    return geometry, joints - longer / by_joints
+    return geometry, joints - longer / mechanism.derivatives(geometry, poses, joints).joints

@@ -131,8 +131,7 @@ class GaugePlaces:
         """The fixture is put where the gauges are in its first seat."""
         gauges, random = self._settings.gauges, self._random
         placed = gauges.placing_mm * random.standard_normal(3)
-        tilt = np.radians(gauges.misalignment_deg)
-        self.triad = rotations.from_vector(tilt * random.standard_normal(3))
+        self.triad = rotations.from_vector(np.radians(gauges.misalignment_deg) * random.standard_normal(3))
         self.station = ball + placed - self.triad.T @ np.array(gauges.off_middle_mm)
         self._first = self.station, self.triad
         self._seat = FIRST if self._seat_at(ball) == FIRST else None
@@ -264,8 +263,7 @@ class RobotPhysics:
         """The joint variables measured by the encoders (6,), mm."""
         with self._lock:
             flicker = self._settings.encoders.flicker * self._random.standard_normal(6)
-            now = self._clock.now()
-            shown = self._shown_per_mm * self._motion.joints(now)
+            shown = self._shown_per_mm * self._motion.joints(self._clock.now())
             return shown + self._encoder_noise + flicker
 
     def gauge_displacement(self, axis: str) -> float:

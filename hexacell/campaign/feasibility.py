@@ -70,8 +70,7 @@ def too_few_records(plan: Plan) -> Iterator[HexacellError]:
     equations = sum(3 * (records - 1) for records in planned.values())
     if equations >= unknowns:
         return
-    whole = sum(plan.records_at(point) - 1 for point in plan.points)
-    if 3 * whole >= unknowns:
+    if 3 * sum(plan.records_at(point) - 1 for point in plan.points) >= unknowns:
         yield UsageError(
             f"the budget of {plan.budget.description} allows {sum(planned.values())} records at "
             f"{len(planned)} points, {equations} equations for {unknowns} parameters",

@@ -68,14 +68,13 @@ class Forecaster:
             after = error.worst(covariance_update(belief.joint_covariance, *record))
         planned = self.planned(state)
         end, records = error.worst(self._covariance_after(belief, state, planned)), sum(planned.values())
-        begun_later = len(set(planned) - {state.point})
         return Forecast(
             now_mm=now,
             next_mm=after,
             # The planned sets may give less information than the record actually selected.
             end_mm=after if selected and records == 1 else min(end, after),
             records=records,
-            minutes=self.budget.time_model.minutes(records, begun_later),
+            minutes=self.budget.time_model.minutes(records, len(set(planned) - {state.point})),
             systematic_mm=self.systematic_mm(),
         )
 
@@ -126,8 +125,7 @@ class Forecaster:
 
     def known_beside_next(self, belief: RobotBelief, state: CampaignState) -> Array:
         """:attr:`.RobotBelief.joint_covariance` after all that is planned but the point's next record."""
-        planned = self.planned(state)
-        others = {point: more - (point == state.point) for point, more in planned.items()}
+        others = {point: more - (point == state.point) for point, more in self.planned(state).items()}
         return self._covariance_after(belief, state, others)
 
     def _covariance_after(
@@ -253,8 +251,7 @@ def _select(drawn: RobotBelief, poses: PoseBatch, records: int) -> PoseBatch:
     noise = noise + noise[0]
     covariance = drawn.joint_covariance
     for _ in range(min(records, len(targets)) - 1):
-        arrived = np.sign(targets.joints - targets.joints[selected[-1]])
-        every = with_terms(drawn, free, targets, arrived)
+        every = with_terms(drawn, free, targets, np.sign(targets.joints - targets.joints[selected[-1]]))
         change = every - every[0]
         gain = D_OPTIMAL.gain(covariance, change, noise)
         gain[selected] = -np.inf

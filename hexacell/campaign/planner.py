@@ -115,7 +115,6 @@ class Plan:
         """This plan before the noise is measured, which may be larger than stated; poses are not listed."""
         robot, effort = replace(self.robot, noise=self.robot.noise.scaled(CAUTION)), self.effort
         listed = self.pose_list.at(self.points[0]) if self.pose_list is not None else ()
-        turns = (listed[0].angle_to(pose) for pose in listed)
         return replace(
             self,
             robot=robot,
@@ -123,7 +122,7 @@ class Plan:
             effort=replace(effort, candidates=min(effort.candidates, effort.pilot_candidates)),
             estimator=None,
             with_forecast=False,
-            most_turned=max(turns, default=np.pi),
+            most_turned=max((listed[0].angle_to(pose) for pose in listed), default=np.pi),
         )
 
     def allows_provisional(self, state: decisions.CampaignState) -> bool:

@@ -101,8 +101,7 @@ class PoseChooser:
         self, belief: RobotBelief, zero: GaugeZero, state: CampaignState
     ) -> Iterator[tuple[SelectedPose, int]]:
         """Poses to measure, the best first, and the row of the point's record that the path starts from."""
-        last = max(0, len(_visited(state)) - 1)
-        for row in dict.fromkeys([last, 0]):
+        for row in dict.fromkeys([max(0, len(_visited(state)) - 1), 0]):
             with suppress(LimitError):
                 yield self._select(belief, zero, state, row), row
         # So little may be known that nearly all candidates of full size are too large.
@@ -156,8 +155,7 @@ class PoseChooser:
 
 def is_well_known(belief: RobotBelief, zero: GaugeZero) -> bool:
     """Whether the platform's orientation at a zero is known so well that large rotations are safe."""
-    sigma = belief.orientation_sigma(zero.target.poses, zero.target.joints)
-    return bool(sigma <= WELL_KNOWN_SIGMA)
+    return bool(belief.orientation_sigma(zero.target.poses, zero.target.joints) <= WELL_KNOWN_SIGMA)
 
 
 def _as_visited(visited: list[Pose], waypoint: Pose) -> Pose:

@@ -38,8 +38,7 @@ class DescribedFrame(Section):
 
     @model_validator(mode="after")
     def _the_example_matches(self) -> Self:
-        patterns = [self.answer] + ([] if self.at_end is None else [self.at_end])
-        for pattern in patterns:
+        for pattern in [self.answer] + ([] if self.at_end is None else [self.at_end]):
             try:
                 re.compile(pattern)
             except re.error as error:

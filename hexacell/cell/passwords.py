@@ -42,8 +42,7 @@ def with_passwords(
         UsageError: a variable of the environment has control characters or is too long.
     """
     controller = settings.controller
-    path = password_path(controller, folder)
-    found = stated_secrets(path, PasswordFile, VARIABLES, environment)
+    found = stated_secrets(password_path(controller, folder), PasswordFile, VARIABLES, environment)
     if not found:
         return settings
     return settings.model_copy(update={"controller": controller.model_copy(update=found)})

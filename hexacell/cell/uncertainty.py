@@ -151,8 +151,7 @@ class CommonUncertaintySettings(Section):
 
     def source(self, key: str) -> str:
         """Where a size comes from."""
-        grade = SIZES_OF_GRADES[self.grade]
-        assumed = grade.get(key, type(self).model_fields[key].default)
+        assumed = SIZES_OF_GRADES[self.grade].get(key, type(self).model_fields[key].default)
         stated = "cell file" if getattr(self, key) != assumed else f"assumed: {self.grade}"
         return self.sources.get(key, stated)
 

@@ -136,6 +136,4 @@ def _state_covariance(
     moved = np.concatenate(columns, axis=1)
     if moved.shape[1] != states - free:  # the cell file states other effects now
         moved = np.zeros((free, states - free))
-    causes = np.eye(states - free)
-    both = np.block([[covariance + moved @ moved.T, -moved], [-moved.T, causes]])
-    return np.asarray(both)
+    return np.asarray(np.block([[covariance + moved @ moved.T, -moved], [-moved.T, np.eye(states - free)]]))

@@ -109,8 +109,7 @@ class DriftEstimator:
             yield last
 
     def _at(self, scale: float, measurements: MeasurementSet) -> ScaledEstimate:
-        estimate = self._estimators[scale].estimate(measurements)
-        return ScaledEstimate.of(scale, estimate, len(measurements))
+        return ScaledEstimate.of(scale, self._estimators[scale].estimate(measurements), len(measurements))
 
 
 FEWEST_POINTS = 2
@@ -278,6 +277,5 @@ def identified_before(
     """
     mechanism, geometry = robot.mechanism, robot.commanding if identified is None else identified
     rows = mechanism.convention.free_rows
-    sigma = drift_sigma(mechanism, drift_mm, robot.tolerances)
-    drift = drift_covariance(mechanism, geometry, sigma)
+    drift = drift_covariance(mechanism, geometry, drift_sigma(mechanism, drift_mm, robot.tolerances))
     return IdentifiedBefore(mechanism, geometry, covariance[np.ix_(rows, rows)], drift)

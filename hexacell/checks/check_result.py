@@ -79,7 +79,6 @@ def check_result(
     records, points = len(measurements), len(set(measurements.points.tolist()))
     if stated is None:
         return CheckResult(verdict=Verdict.NOT_EVALUATED, records=records, points=points)
-    task = check.plan.task.reachable(stated.estimate.belief)
     return CheckResult(
         verdict=stated.verdict,
         records=records,
@@ -88,7 +87,7 @@ def check_result(
             stated.errors,
             check.settings,
             check.robot,
-            task,
+            check.plan.task.reachable(stated.estimate.belief),
             length=None if earlier is None else earlier.length,
         ),
         is_consistent=stated.is_consistent,
@@ -125,8 +124,7 @@ def _changes(estimate: OnlineEstimate) -> Iterator[ParameterChange]:
     convention = belief.mechanism.convention
     change = belief.free - convention.free_parameters(belief.controller)
     sigma = np.sqrt(np.diag(belief.covariance))
-    rows = convention.free_rows
-    for row, moved, deviation in zip(rows, change.tolist(), sigma.tolist(), strict=True):
+    for row, moved, deviation in zip(convention.free_rows, change.tolist(), sigma.tolist(), strict=True):
         parameter = belief.mechanism.parameters.parameters[row]
         yield ParameterChange(
             name=parameter.name, unit=parameter.kind.unit.value, change=moved, sigma=deviation

@@ -77,8 +77,7 @@ def note_write(paths: Sequence[Path], before: Contents, after: Contents) -> None
         _NotedFile(path=path.absolute(), before=old.decode(_AS_TEXT), sha256_after=atomic_files.sha256(new))
         for path, old, new in zip(paths, before, after, strict=True)
     )
-    most_private = min(paths, key=_readers)
-    atomic_files.write_own(place, _Note(files=files).to_json(), like=most_private)
+    atomic_files.write_own(place, _Note(files=files).to_json(), like=min(paths, key=_readers))
 
 
 def forget_write(paths: Sequence[Path]) -> None:

@@ -57,8 +57,7 @@ class NativeToml:
 
     def read(self, text: str, source: Path | None) -> ConfigPart:
         """All parameters, or the kinds that ``[geometry]`` has; raises ``FileError`` with the line."""
-        document = TomlDocument.parse(text, source)
-        there, found = self._content(document)
+        there, found = self._content(TomlDocument.parse(text, source))
         vector = Geometry.of(there, found["geometry"]).vector.tolist() if there.kinds else []
         branch: Branch | None = None if self._is_part else ()
         if there.has_branch:

@@ -61,8 +61,7 @@ class FrameTests:
                 np.testing.assert_allclose(turn, np.eye(3), atol=ROUNDING)
             np.testing.assert_allclose(change.origin, 0.0, atol=ROUNDING)
             for other in example.changes_of_frames():
-                changed = mechanism.change_frames(geometry, other)
-                found, _ = mechanism.normalize_frames(changed)
+                found, _ = mechanism.normalize_frames(mechanism.change_frames(geometry, other))
                 np.testing.assert_allclose(found.vector, normal.vector, atol=ROUNDING, err_msg=str(other))
 
     def test_changes_of_frames_change_no_machine(self) -> None:
@@ -133,8 +132,7 @@ def _by_parameters(example: MechanismExample, basis: Array) -> Array:
         larger = np.concatenate([poses.positions, np.zeros((len(poses), 3))], axis=-1)
         unseen = np.concatenate([unseen, larger[..., None]], axis=-1)
     frames, _ = np.linalg.qr((weights * unseen).reshape(-1, unseen.shape[-1]))
-    left = columns - frames @ (frames.T @ columns)
-    return np.linalg.svd(left, compute_uv=False)
+    return np.linalg.svd(columns - frames @ (frames.T @ columns), compute_uv=False)
 
 
 def _error(found: Identification, truth: Array) -> tuple[int, float]:

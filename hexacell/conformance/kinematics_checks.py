@@ -143,8 +143,7 @@ def _check_derivatives_at(
         return mechanism.residual_and_jacobian(changed, poses, joints)[0]
 
     sizes = np.array([STEPS[parameter.kind.unit] for parameter in parameters.parameters])
-    names = [f"pose {column}" for column in range(1, 7)]
-    _compare(found.pose, by_twist, TWIST_STEPS, names)
+    _compare(found.pose, by_twist, TWIST_STEPS, [f"pose {column}" for column in range(1, 7)])
     of_each_joint = found.joints[..., None] * np.eye(6)
     _compare(of_each_joint, by_joints, np.full(6, JOINT_STEPS[mechanism.words.joint_unit]), ["joints"] * 6)
     # Leg i depends on its own numbers alone.

@@ -151,6 +151,5 @@ def workspace_poses(belief: RobotBelief, points: Array) -> PoseBatch:
     """
     axes = np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
     rotated = rotations.from_vector(min(WORKSPACE_ANGLE, belief.limits.tilt) * axes)
-    positions = np.repeat(points, len(rotated), axis=0)
-    poses = PoseBatch(positions, np.tile(rotated, (len(points), 1, 1)))
+    poses = PoseBatch(np.repeat(points, len(rotated), axis=0), np.tile(rotated, (len(points), 1, 1)))
     return reachable(belief, poses)[0].poses

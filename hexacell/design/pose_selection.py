@@ -111,8 +111,7 @@ def select_from_list(
     records = predict_records(belief, zero, targets)
     inside = np.flatnonzero(records.within(belief.limits))[skipped:]
     search = _PathSearch(TravelConstraint(belief, zero), planner)
-    no_preference = np.full(len(inside), np.inf)
-    selected = search.first_of_few(records[inside], commands[rows[inside]], no_preference)
+    selected = search.first_of_few(records[inside], commands[rows[inside]], np.full(len(inside), np.inf))
     if selected is None:
         raise LimitError(
             "none of the poses left in the list surely keeps the ball inside the gauges' travel"

@@ -95,8 +95,7 @@ class TravelConstraint:
     def _holds_linearly(self, records: predicted_records.PredictedRecords) -> Mask:
         if self.is_uncertain:
             return np.zeros(len(records), dtype=bool)
-        within = records.within(self.belief.limits, LINEAR_SHARE)
-        return within & self._legs_are_free(records.targets)
+        return records.within(self.belief.limits, LINEAR_SHARE) & self._legs_are_free(records.targets)
 
     def _legs_are_free(self, targets: ReachableTargets) -> Mask:
         """At which of n targets passive joints have angles left for the orientation's uncertainty."""

@@ -36,8 +36,7 @@ def select_validation_poses(
     Raises:
         LimitError: too few of them do.
     """
-    level_first = np.concatenate([np.eye(3)[None], turns])
-    every = PoseBatch.at(point, belief.limits.orientations(level_first))
+    every = PoseBatch.at(point, belief.limits.orientations(np.concatenate([np.eye(3)[None], turns])))
     limits = belief.limits
     allowed = limits.allow_commands(every) & limits.allow_joints(belief.commanded.joints(every))
     poses = reachable_targets(belief, every[allowed]).poses

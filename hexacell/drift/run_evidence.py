@@ -143,8 +143,7 @@ class CarriedPosterior(RunEvidence):
     @classmethod
     def diffuse(cls, free: int, causes: int) -> "CarriedPosterior":
         """Nothing known of so many free parameters; shared causes have unit variance."""
-        precision = np.diag([DIFFUSE**-2] * free + [1.0] * causes)
-        return cls(precision, np.zeros(free + causes))
+        return cls(np.diag([DIFFUSE**-2] * free + [1.0] * causes), np.zeros(free + causes))
 
     @property
     def state(self) -> Array:
@@ -164,8 +163,7 @@ class CarriedPosterior(RunEvidence):
         share = np.linalg.solve(self.information + run.information, self.information).T
         score = causes @ (share @ run.gradient(self.state))
         variance = np.einsum("ms,st,mt->m", causes, share @ run.information, causes)
-        own = np.einsum("ms,st,mt->m", causes, run.information, causes)
-        is_seen = variance > LEAST_SHARE * own
+        is_seen = variance > LEAST_SHARE * np.einsum("ms,st,mt->m", causes, run.information, causes)
         return np.where(is_seen, score / np.sqrt(np.where(is_seen, variance, 1.0)), np.nan)
 
     def forgetting(self, causes: Array) -> "CarriedPosterior":

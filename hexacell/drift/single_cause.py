@@ -73,12 +73,11 @@ def single_cause_test(records: WhitenedRecords, covariance: Array, causes: Array
     information = np.einsum("rm,rm->m", signatures, signatures)
     is_seen = information > SEEN_SHARE * information.max()
     root = np.sqrt(np.where(is_seen, information, 1.0))
-    unit = np.where(is_seen, signatures / root, 0.0)
     return SingleCauseTest(
         scores=np.where(is_seen, found / root, 0.0),
         changes=np.where(is_seen, found / root**2, 0.0),
         sigmas=np.where(is_seen, 1.0 / root, np.inf),
-        limit=_largest_by_chance(unit),
+        limit=_largest_by_chance(np.where(is_seen, signatures / root, 0.0)),
     )
 
 

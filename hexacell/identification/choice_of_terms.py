@@ -150,8 +150,7 @@ class _Search:
         return self.without.with_causes(by_coefficients @ spread_of(terms))
 
     def _evidence(self, terms: Model) -> float:
-        every = np.ones(len(self.records), dtype=bool)
-        return self._model(terms).log_evidence(every, self.scale)
+        return self._model(terms).log_evidence(np.ones(len(self.records), dtype=bool), self.scale)
 
     def _predicted(self, terms: Model) -> float:
         """Sum of the logarithms of the densities of each point's records, given all others."""

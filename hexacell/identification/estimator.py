@@ -55,8 +55,7 @@ def identify(problem: Problem, *, find_outliers: bool = True) -> Identification:
         selection, findings = _without_faults(problem) if find_outliers else (Selection.of_all(problem), ())
     except UncorrectableFaultError as refused:
         raise GaugeFaultError(messages.refused(refused)) from None
-    faults = messages.left_out(selection)
-    found = replace(selection.selected.fit, data_faults=faults, tried_terms=findings)
+    found = replace(selection.selected.fit, data_faults=messages.left_out(selection), tried_terms=findings)
     _require_enough_records(found.problem)
     return found
 

@@ -79,8 +79,7 @@ class FrameConvention:
     @cached_property
     def dependent(self) -> tuple[tuple[int, int], ...]:
         """Parameters that are equal to another one, and the free parameter that stands for both."""
-        equal = [name for group in self.equal for name in group[1:]]
-        rows = self.parameters.rows(equal)
+        rows = self.parameters.rows([name for group in self.equal for name in group[1:]])
         return tuple(zip(rows.tolist(), self.basis[rows].argmax(axis=1).tolist(), strict=True))
 
     def free_parameters(self, geometry: Geometry) -> Array:

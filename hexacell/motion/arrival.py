@@ -51,10 +51,9 @@ def arrival_directions(joints: Array, before: Sequence[int], least: float) -> Di
     """
     if not np.isfinite(joints).all():  # somewhere no joint variables belong to the line
         return UNKNOWN
-    known = before or UNKNOWN
     return tuple(
         _direction([float(value) for value in way], one, least)
-        for way, one in zip(joints.T, known, strict=True)
+        for way, one in zip(joints.T, before or UNKNOWN, strict=True)
     )
 
 

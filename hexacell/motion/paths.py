@@ -131,10 +131,9 @@ class PathOptions:
             return [None] * len(rows)
         waypoints = tuple(self._shifted(piece, rows[is_open]) for piece in WAYPOINT_PIECES)
         lines = self.planner.lines.check(self.ends[rows[is_open]], waypoints, thorough=len(self.ends) == 1)
-        places = np.cumsum(is_open) - 1
         return [
             _path(lines, waypoints, place) if opened else None
-            for place, opened in zip(places.tolist(), is_open.tolist(), strict=True)
+            for place, opened in zip((np.cumsum(is_open) - 1).tolist(), is_open.tolist(), strict=True)
         ]
 
     def via_reference(self, rows: Rows) -> list[Path | None]:

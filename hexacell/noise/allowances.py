@@ -91,8 +91,7 @@ class Allowances:
         stated = max(guards.following, self.stop_sigmas * self.stops)
         if self.is_measured or not wanted.revisits:
             return stated
-        reference = Pose(*self.settings.identification.points[0])
-        ball = self.ball_at(reference)
+        ball = self.ball_at(Pose(*self.settings.identification.points[0]))
         room = gauge_travel_of(self.settings).sure_room.smallest_mm
         return max(stated, room / float(np.linalg.norm(ball.by_joints, axis=0).max()))
 
@@ -145,8 +144,7 @@ class Allowances:
         if self.settings.stations.placement == "fixed":
             return np.full(3, max(stated, kept))
         scatter = self.stops * np.linalg.norm(self.ball_at(reference).by_joints, axis=1)
-        widened = np.minimum(self.stop_sigmas * scatter, kept)
-        return np.asarray(np.maximum(stated, widened))
+        return np.asarray(np.maximum(stated, np.minimum(self.stop_sigmas * scatter, kept)))
 
     def require_travel(self, reference: Pose) -> None:
         """Require gauges in which the ball stays by chance, if it is not moved at all.

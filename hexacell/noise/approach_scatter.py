@@ -132,13 +132,12 @@ def approach_scatter(
         freedom=len(shown) - 1,
     )
     freedom, chi_square = 3 * visits.freedom, visits.unexplained()
-    as_drawn = replace(visits, stated=instruments).unexplained()
     found = RepeatedApproaches(
         visits=len(deviations),
         degrees_of_freedom=freedom,
         ball_mm=float(np.sqrt(np.trace(visits.products[:3, :3]) / visits.freedom)),
         ratio=float(np.sqrt(chi_square / freedom)),
-        ratio_as_drawn=float(np.sqrt(as_drawn / freedom)),
+        ratio_as_drawn=float(np.sqrt(replace(visits, stated=instruments).unexplained() / freedom)),
         stops=_stops(visits, encoders**2),
         stop_unit=joint_unit,
     )

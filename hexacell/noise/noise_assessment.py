@@ -61,10 +61,9 @@ class NoiseReadings:
 def assess_noise(plan: Plan, readings: NoiseReadings) -> measured_noise.MeasuredNoise:
     """The noise of the records that a plan is carried out with from now on."""
     assessment, stated = _NoiseAssessment(plan, readings), plan.robot.noise
-    sigmas = {windows: assessment.of_records(windows) for windows in WINDOWS}
     noise = {
         windows: stated.with_devices(sigma[3:].tolist(), sigma[:3].tolist())
-        for windows, sigma in sigmas.items()
+        for windows, sigma in {windows: assessment.of_records(windows) for windows in WINDOWS}.items()
     }
     forecaster = AveragingForecaster(plan)
     forecasts = forecaster.forecasts(noise)

@@ -76,13 +76,12 @@ def as_written(
     corrections, left = corrections_for(terms, settings, robot.holds, robot.corrections)
     if left:
         identified = absorbing(settings, robot, identified, left)
-    task = Task.of(settings, robot, robot.belief())
     choice = choose_frames(
         robot.mechanism,
         robot.branch,
         taught=robot.taught,
         new=identified,
-        poses=robot.frames.inverse().poses(task.poses),
+        poses=robot.frames.inverse().poses(Task.of(settings, robot, robot.belief()).poses),
     )
     moved = TaskDisplacement.of(choice.displacement, settings.acceptance)
     if corrections is not None and (corrections.play_mm, corrections.compliance_um_n) != (NONE, NONE):

@@ -252,8 +252,7 @@ def robot_of(cell: Cell) -> Robot:
     nominal = cell.settings.drawing
     for geometry, path in ((controller.geometry, cell.config_path), (taught.geometry, cell.taught_path)):
         require_frames(cell.settings.mechanism, geometry, path)
-    line = cell.document.line_of(("robot", "nominal"))
-    require_frames(cell.settings.mechanism, nominal, cell.path, line)
+    require_frames(cell.settings.mechanism, nominal, cell.path, cell.document.line_of(("robot", "nominal")))
     require_same_robot(cell, nominal, controller.geometry)
     return make_robot(cell.settings, controller, taught=taught.geometry)
 

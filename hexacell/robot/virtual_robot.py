@@ -86,8 +86,7 @@ class VirtualRobot:
         Raises:
             ReachError: it cannot take the command clear of singularities.
         """
-        commands = self.model.from_commands([command])
-        actual = self.actual_poses(commands)
+        actual = self.actual_poses(self.model.from_commands([command]))
         if not actual.found[0] or self._see_margin(actual.poses, actual.joints) < self._least_margin:
             raise ReachError(f"this robot cannot reach {command}")
         here = actual.joints if self._joints_commanded is None else self._joints_commanded
@@ -117,11 +116,10 @@ class VirtualRobot:
         Raises:
             LimitError: no pose of that geometry belongs to the joint variables.
         """
-        joints = self._joints(self._commanded)
         found = continue_solution(
             model.mechanism,
             model.commanding,
-            joints,
+            self._joints(self._commanded),
             start=self._commanded,
             start_geometry=self.model.commanding,
         )
@@ -245,5 +243,4 @@ def exact_records(robot: Robot, point: int, poses: PoseBatch) -> Iterator[Record
     for row in range(len(poses)):
         command = robot.to_command(poses.pose(row))
         directions = arrival_directions(joints[max(0, row - 1) : row + 1], directions, least)
-        deviation = deviation_of(shown[row])
-        yield Record(point, row + 1, command, joints_of(joints[row]), deviation, directions)
+        yield Record(point, row + 1, command, joints_of(joints[row]), deviation_of(shown[row]), directions)

@@ -148,8 +148,7 @@ class RunHost:
         engine.broker.watchers.append(self._on_question)
 
     def _record(self, event: events.Event, _: RunState) -> None:
-        at = now()[0]
-        self._send_event(messages.EventRecorded(sequence=self._sequence + 1, at=at, event=event))
+        self._send_event(messages.EventRecorded(sequence=self._sequence + 1, at=now()[0], event=event))
 
     def _send_event(self, recorded: messages.EventRecorded) -> None:
         self._sequence, self._last = recorded.sequence, recorded.event

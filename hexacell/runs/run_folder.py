@@ -124,8 +124,7 @@ def runs_folder_of_unreadable(path: Path) -> Path | None:
 def _stated_name(text: str) -> str | None:
     """The name that a cell file states above its first section."""
     above = itertools.takewhile(lambda line: not line.lstrip().startswith("["), text.splitlines())
-    found = map(_NAME.match, above)
-    return next((one["name"] for one in found if one is not None), None)
+    return next((one["name"] for one in map(_NAME.match, above) if one is not None), None)
 
 
 def new_run(cell: Cell) -> RunFolder:

@@ -129,6 +129,5 @@ def _require_keys(keys: object, path: Path) -> None:
         if name not in known:
             action = did_you_mean(name, known) or f"The actions are {', '.join(known)}"
             raise FileError(f"there is no action {name!r}", subject=path, action=action)
-    used = Counter((known | keys).values())
-    if twice := [key for key, times in used.items() if times > 1]:
+    if twice := [key for key, times in Counter((known | keys).values()).items() if times > 1]:
         raise FileError(f"the key {twice[0]!r} is used twice", subject=path, action="Choose another")

@@ -77,8 +77,7 @@ def require_design(cell: Cell) -> None:
 
 def design_facts(cell: Cell) -> Iterator[HexacellError]:
     """What is wrong with a design as a whole; raises ``FileError`` as ``robot_of`` does."""
-    pose_list = pose_list_of(cell)
-    stated = stated_poses(cell.settings, has_list=pose_list is not None)
+    stated = stated_poses(cell.settings, has_list=pose_list_of(cell) is not None)
     commands = PoseBatch.of(pose for _, _, pose in stated)
     if (turned := other_units.task_in_radians(cell)) is not None:
         yield turned
@@ -181,8 +180,7 @@ def _others(
 
 def _drawn_as(settings: CellSettings, drawing: Geometry) -> CellSettings:
     nominal = type(settings.robot.nominal).model_validate(drawing.document(), strict=False)
-    robot = settings.robot.model_copy(update={"nominal": nominal})
-    return settings.model_copy(update={"robot": robot})
+    return settings.model_copy(update={"robot": settings.robot.model_copy(update={"nominal": nominal})})
 
 
 def _of_drawing(cell: Cell, problem: str, action: str) -> FileError:

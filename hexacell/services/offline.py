@@ -92,8 +92,7 @@ def fit_measurements(
         from hexacell.noise.measured_noise import with_measured_noise  # noqa: PLC0415 - only for a run
         from hexacell.services.history.recorded_cell import commanding_geometries, noise_of_run  # noqa: PLC0415 - likewise
 
-        recorded = commanding_geometries(folder, cell.settings)
-        robot = replace(robot, earlier=(*recorded, *robot.earlier))
+        robot = replace(robot, earlier=(*commanding_geometries(folder, cell.settings), *robot.earlier))
         measured = noise_of_run(folder, cell.settings)
         if measured is not None:
             settings = with_measured_noise(settings, measured)

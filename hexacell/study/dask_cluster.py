@@ -214,10 +214,9 @@ def _in_version(
 ) -> ResultType:
     """Carry a task out in a worker, which may have come later with another version."""
     if version != __version__:
-        place = distributed.get_worker().address
         raise ClusterError(
             f"has hexacell {__version__}, the study {version}",
-            subject=place,
+            subject=distributed.get_worker().address,
             action=f"Install hexacell=={version} there",
         )
     return function(*arguments, **named)

@@ -119,10 +119,9 @@ def reached(robot: Robot, truth: Geometry, commands: PoseBatch, margin: float) -
     rows = actual.found & robot.limits.allow_commands(commands) & robot.limits.allow_joints(actual.joints)
     rows[rows] = robot.limits.allow_legs(robot.mechanism, truth, actual.poses[rows], actual.joints[rows])
     found = Reached(commands, actual.joints, actual.poses)[rows]
-    sides = ((robot.commanding, found.commands), (truth, found.actual))
     clear = [
         has_singularity_margin(robot.mechanism, geometry, poses, found.joints, margin)
-        for geometry, poses in sides
+        for geometry, poses in ((robot.commanding, found.commands), (truth, found.actual))
     ]
     return found[np.logical_and(*clear)]
 

@@ -82,8 +82,7 @@ def chosen_records(
                     records.append(virtual.measure(point, orientation))
             return ChosenRecords(robot, MeasurementSet(tuple(records)))
         case OrientationChoice.SIFTED:
-            sifted = _random(settings, robot, truth, random, RANDOM_DEG[:1], MOST_TRIES)
-            return ChosenRecords(robot, sifted)
+            return ChosenRecords(robot, _random(settings, robot, truth, random, RANDOM_DEG[:1], MOST_TRIES))
         case OrientationChoice.RANDOM:
             wanted = settings.identification.orientations - 1
             return ChosenRecords(robot, _random(settings, robot, truth, random, RANDOM_DEG, wanted))
@@ -112,16 +111,14 @@ def _selected(
 
     Each of the others gains most of all that are possible beside those before it.
     """
-    level = belief.limits.orientations(np.eye(3)[None])
-    chosen = reachable_targets(belief, PoseBatch.at(ball, level))
+    chosen = reachable_targets(belief, PoseBatch.at(ball, belief.limits.orientations(np.eye(3)[None])))
     if not len(chosen):
         raise LimitError("the level pose cannot be reached at a point")
     possible = possible_targets(belief, _zero(belief, chosen), POSSIBLE, seed)
     possible = possible[commands_for(belief, possible)[1]]
     while len(chosen) < count:
         records = predict_records(belief, _zero(belief, chosen), possible)
-        gains = D_OPTIMAL.gain(belief.covariance, records.jacobian, records.covariance)
-        best = int(np.argmax(gains))
+        best = int(np.argmax(D_OPTIMAL.gain(belief.covariance, records.jacobian, records.covariance)))
         at_best = belief.covariance, records.jacobian[best], records.covariance[best]
         belief = replace(belief, covariance=covariance_update(*at_best))
         chosen = ReachableTargets.joined([chosen, possible[np.array([best])]])

@@ -104,8 +104,7 @@ def run_design_trial(trial: DesignTrial) -> DesignOutcome:
         found = [_identified(chosen, count) for count in counts]
         accuracies = tuple(_accuracy(cell, chosen.robot, one, truth) for one in found if one is not None)
         deviations = [np.abs(record.deviation).max() for record in chosen.measurements.records]
-        last = found[-1]
-        reason = "" if last is not None else f"its {len(points)} records do not determine the robot"
+        reason = "" if found[-1] is not None else f"its {len(points)} records do not determine the robot"
         return DesignOutcome(accuracies, float(max(deviations)), reason)
     except HexacellError as error:
         return DesignOutcome(reason=error.problem)

@@ -121,8 +121,7 @@ def temperature_while_measuring(kelvin: float, um_per_m_k: Mapping[MachinePart, 
     """The whole machine becomes warmer by this much from the first record to the last, evenly."""
 
     def expansion(placement: Placement) -> Array:
-        progress = np.linspace(-0.5, 0.5, len(placement))
-        return progress[:, None, None] * _warmer(placement, um_per_m_k)
+        return np.linspace(-0.5, 0.5, len(placement))[:, None, None] * _warmer(placement, um_per_m_k)
 
     return Effect("temperature while measuring", kelvin, "K", Occurrence.MEASURING, expansion)
 
@@ -175,8 +174,7 @@ def own_weight(newton: float, um_per_n: float, weight: Weight) -> Effect:
     """
 
     def yielding(placement: Placement) -> Array:
-        forces = leg_forces(placement, weight)
-        each = THOUSANDTH * um_per_n * placement.by_constraints * forces[:, None, :]
+        each = THOUSANDTH * um_per_n * placement.by_constraints * leg_forces(placement, weight)[:, None, :]
         return np.concatenate([each.sum(axis=-1, keepdims=True), LEGS_DIFFER * each], axis=-1)
 
     return Effect("own weight", newton, "N", Occurrence.CONSTANT, yielding)
@@ -255,8 +253,7 @@ def rail_waves(um: float, wavelength_mm: float) -> Effect:
         return np.asarray(THOUSANDTH / np.sqrt(2.0) * np.stack([np.sin(phase), np.cos(phase)], axis=-1))
 
     name = f"waves of the rails, {wavelength_mm:g} mm long"
-    columns = partial(_across_rails, shapes=waves)
-    return Effect(name, um, "um", Occurrence.CONSTANT, columns)
+    return Effect(name, um, "um", Occurrence.CONSTANT, partial(_across_rails, shapes=waves))
 
 
 def common_sag(um: float, half_length_mm: float) -> Effect:

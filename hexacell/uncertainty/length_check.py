@@ -221,8 +221,7 @@ class LengthCheck:
         design[np.arange(len(self.records)), :, self.records.seats] = np.eye(3)
         rows = design.reshape(-1, 6)
         weighted = np.linalg.solve(self._covariance, rows)
-        gain = np.linalg.solve(rows.T @ weighted, weighted.T)
-        return np.asarray(gain.reshape(2, 3, -1, 3))
+        return np.asarray(np.linalg.solve(rows.T @ weighted, weighted.T).reshape(2, 3, -1, 3))
 
     @cached_property
     def _covariance(self) -> Array:

@@ -151,8 +151,7 @@ def errors_by_gauges(
     records: LengthRecords, standard: LengthStandard, noise: Noise
 ) -> Iterator[LengthError]:
     """Where the gauges sit at each mounting, and how they are turned against the base."""
-    mountings = np.unique(records.mountings)
-    sits = records.mountings[:, None] == mountings
+    sits = records.mountings[:, None] == np.unique(records.mountings)
     seated = np.einsum("nm,ab->namb", sits, np.eye(3)).reshape(len(records), 3, -1)
     yield LengthError("seating of the gauges", standard.seating_mm * seated)
     turned = np.cross(np.eye(3), records.placement.deviations[:, None]).swapaxes(1, 2)

@@ -146,8 +146,7 @@ def _of_the_records(test: ExcessTest) -> Iterator[PossibleCause]:
             continue
         if type(hypothesis) not in kinds:
             kinds.add(type(hypothesis))
-            share = test.share_of_gain(hypothesis.gain, hypothesis.unknowns)
-            yield PossibleCause(_name(hypothesis), share)
+            yield PossibleCause(_name(hypothesis), test.share_of_gain(hypothesis.gain, hypothesis.unknowns))
 
 
 def _name(hypothesis: hypotheses.FaultHypothesis) -> str:

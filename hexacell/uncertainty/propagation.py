@@ -111,16 +111,14 @@ class Propagation:
     def _gain(self) -> Array:
         """(p, n, 3) errors of the free parameters by errors of the records, mm."""
         prediction = self.found.prediction
-        centred = self._elimination.centred(prediction.jacobian)
-        weighted = np.swapaxes(centred, -1, -2) @ prediction.weights
+        weighted = np.swapaxes(self._elimination.centred(prediction.jacobian), -1, -2) @ prediction.weights
         return np.asarray(np.einsum("pq,nqa->pna", self._kept_covariance, weighted))
 
     def parameter_columns(self, effect: Effect) -> Array:
         """Errors (p, k) of the free parameters by one unit of each cause of an effect."""
         if not effect.occurrence.is_in_records:
             return np.zeros((len(self._gain), 0))
-        on_records = errors_of_records(effect, self.found.placement)
-        each: Array = np.einsum("pna,nak->pnk", self._gain, on_records)
+        each: Array = np.einsum("pna,nak->pnk", self._gain, errors_of_records(effect, self.found.placement))
         before = None
         if effect.name in self.earlier:
             before = self._kept_covariance @ self.found.active_prior @ self.earlier[effect.name]

@@ -108,8 +108,7 @@ class JudgedError(Frozen):
 
 def worst_verdict(verdicts: Iterable[Verdict]) -> Verdict:
     """The verdict of several together: the worst of them; not evaluated without any."""
-    order = list(Verdict)
-    return max(verdicts, key=order.index, default=Verdict.NOT_EVALUATED)
+    return max(verdicts, key=list(Verdict).index, default=Verdict.NOT_EVALUATED)
 
 
 def decide_both(position: LargestError, orientation: LargestError, limits: ErrorLimits) -> Verdict:

@@ -115,8 +115,7 @@ class Calibration:
     def robot_checked(self, robot: Robot) -> Robot:
         """A robot as the accepted result left it, with its drift since, before a length check."""
         assert self.accepted is not None  # noqa: S101 - without one no length check is begun
-        before = self.before(robot, self.accepted)
-        return replace(self.as_known(robot), known=before.prior(1.0))
+        return replace(self.as_known(robot), known=self.before(robot, self.accepted).prior(1.0))
 
     def as_known(self, robot: Robot) -> Robot:
         """A robot with the terms beside its geometry by the accepted result, if there is one."""
@@ -338,11 +337,10 @@ def campaign_state(state: RunState, key: SetKey | None) -> CampaignState:
     closed = {at.point for at, measured in sets.items() if measured.closed}
     # Those whose reference the controller refuses cannot be measured.
     refused = {one.at for one in state.excluded if one.at.phase is Phase.IDENTIFY}
-    left = {at.point for at in refused if state.is_left(at)}
     return CampaignState(
         measurements=MeasurementSet(records),
         point=None if key is None else key.point,
-        done=frozenset(closed | left),
+        done=frozenset(closed | {at.point for at in refused if state.is_left(at)}),
         present=_present_pose(state, key),
         rejections=0 if key is None else state.set(key).rejections,
         zero_mm=None if key is None else state.zero_shown(key),

@@ -128,8 +128,7 @@ def held_out_replacements(
         for before, poses, chosen in zip(found.held_out, present, others, strict=True):
             if before and state.refused.allows(before[0]):
                 left_out = (pose for pose in poses if not state.refused.allows(pose))
-                new = (pose for pose in chosen if pose not in poses)
-                yield from zip(left_out, new, strict=False)
+                yield from zip(left_out, (pose for pose in chosen if pose not in poses), strict=False)
 
 
 def _chooser(known: Knowledge, robot: Robot) -> HeldOutPoses:

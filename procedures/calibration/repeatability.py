@@ -147,8 +147,7 @@ def _visits(plan: Plan, state: RunState, allowances: Allowances) -> NoiseReading
     visited = state.sets.get(state.noise.at)
     if visited is None or not visited.samples or len(visited.visits) < plan.settings.noise.revisits:
         return None
-    windows = state.noise.noise.windows
-    return noise_readings(visited, plan.settings.encoders, allowances, windows=windows)
+    return noise_readings(visited, plan.settings.encoders, allowances, windows=state.noise.noise.windows)
 
 
 def worsening_by_repeats(

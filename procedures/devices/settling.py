@@ -142,10 +142,9 @@ async def _look(
     while len(window) > timing.readings and window[-1].at_s - window[1].at_s >= timing.window_s:
         window.popleft()
     settled = Settled(tuple(window))
-    gauges = zip(devices.gauges, np.ptp(settled.gauges, axis=0), strict=True)
     moving = [
         f"gauge {m.gauge.name} by {spread:.3f} mm"
-        for m, spread in gauges
+        for m, spread in zip(devices.gauges, np.ptp(settled.gauges, axis=0), strict=True)
         if spread > timing.spread_gauge_mm
     ]
     legs, unit = enumerate(np.ptp(settled.joints, axis=0), start=1), settled.window[0].encoders.unit

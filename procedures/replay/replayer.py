@@ -226,10 +226,9 @@ class Replayer:
         self.executor.recorded.outcome = event
         derived = await _result_or_error(self.executor.perform(step, self._state))
         self._compare_with(Aspect.RESULT, step.key, event, derived)
-        if isinstance(event, events.RecordTaken):
-            encoders = self.executor.cell.settings.encoders
-            if change := counts_mismatch(event.reading, encoders):
-                self._add_difference(Aspect.RESULT, step.key, change)
+        encoders = self.executor.cell.settings.encoders
+        if isinstance(event, events.RecordTaken) and (change := counts_mismatch(event.reading, encoders)):
+            self._add_difference(Aspect.RESULT, step.key, change)
 
     async def _interruption(self, event: events.Interrupted) -> None:
         """A failure without a device or the disk is computed again; any other is taken from the journal."""

@@ -107,8 +107,7 @@ class Startup:
 
     async def _permitted(self, refusal: StartupNotPermitted, *, is_theirs: bool) -> StartupActions:
         """What a person permits; nothing where that person has done it."""
-        question = ask_startup(refusal.needed, str(refusal), is_theirs=is_theirs)
-        if await self.operator.ask(question) != YES:
+        if await self.operator.ask(ask_startup(refusal.needed, str(refusal), is_theirs=is_theirs)) != YES:
             raise Interruption(f"{refusal}, which was left as it is")
         return frozenset() if is_theirs else frozenset({refusal.needed})
 

@@ -160,8 +160,7 @@ class RunResources:
         lines = PoseBatch.joined([interpolate_line(*ends, ARRIVAL_PIECES) for ends in pairwise(poses)])
         states = commanding.geometry, commanding.branch, commanding.corrections
         joints, _ = commanded_joints(mechanism, *states, lines)
-        stops = self.calibration.known(state).allowances.stops
-        least = least_way(mechanism.words.joint_unit, stops)
+        least = least_way(mechanism.words.joint_unit, self.calibration.known(state).allowances.stops)
         return arrival_directions(joints, state.directions, least)
 
     # What the instruments read.

@@ -104,8 +104,7 @@ class Question:
 def ask_placement(at: SetKey, pose: Pose) -> Question:
     """Ask for the gauges to be placed around the ball, or mounted in a seat; answered when they are."""
     seat = at.seat if at.phase is Phase.LENGTH else None
-    place = GaugePlacement(at.point, pose, at.station, seat)
-    return Question(place, choices=(PLACED,), default=PLACED)
+    return Question(GaugePlacement(at.point, pose, at.station, seat), choices=(PLACED,), default=PLACED)
 
 
 def ask_approval(change: PendingChange, *, cell: str) -> Question:

@@ -41,6 +41,5 @@ class AssessNoise(Computation):
         before = run.calibration.known(state).allowances
         readings = noise_readings(state.set(key), run.settings.encoders, before)
         measured = NoiseMeasured(at=key, noise=assess_noise(run.calibration.plan, readings))
-        known = run.calibration.known(measured.applied_to(state))
-        known.allowances.require_travel(readings.reference)
+        run.calibration.known(measured.applied_to(state)).allowances.require_travel(readings.reference)
         return measured

@@ -70,8 +70,7 @@ class CloseSet(StepOfSet):
         reading = await run.read(state)
         change = run.since_reference(state, self.at, reading)
         await run.check_gauges()
-        unit = run.settings.mechanism.words.joint_unit
-        trip = encoder_slip(str(self.at), change, unit)
+        trip = encoder_slip(str(self.at), change, run.settings.mechanism.words.joint_unit)
         if trip := trip or reference_drift(str(self.at), change, run.settings.acceptance.drift_mm):
             raise trip.as_error()  # not latched, as nothing moved
         drift_mm = deviation_of(change.unexplained_mm)

@@ -96,8 +96,7 @@ def _checked(run: RunResources, state: RunState) -> ResultValidated:
     measurements = state.measurements()
     write_measurements(run.folder.measurements, measurements)
     known, accepted = run.calibration.known(state), run.calibration.accepted
-    effects = known.robot_of(state).effects
-    found = check_result(known.check, measurements, accepted, effects)
+    found = check_result(known.check, measurements, accepted, known.robot_of(state).effects)
     return ResultValidated(verdict=found.verdict, line=check_line(found), check=found)
 
 

@@ -44,8 +44,7 @@ class Lend(StepWithoutMotion):
 
     async def perform(self, run: RunResources, state: RunState) -> ProvisionalApplied:
         """Write the config and have it read; raises ``WriteBackUndone`` if the controller does not."""
-        known = run.calibration.known(state)
-        geometry = await in_thread(known.provisional_geometry, state)
+        geometry = await in_thread(run.calibration.known(state).provisional_geometry, state)
         config, written = run.config, run.calibration.robot.for_controller(geometry)
         await config.apply(
             await in_thread(config.change_to, written, state),

@@ -9,10 +9,7 @@ from dataclasses import dataclass
 from hexacell.errors import LimitError
 from procedures.run.keys import Phase, SetKey, SixNumbers
 from procedures.run.state import RunState
-from procedures.steps.events import Step
-from procedures.steps.judge import Judge
-from procedures.steps.locate import Locate
-from procedures.steps.move import Move
+from procedures.steps import events
 from procedures.workflow.sets import SetSteps, TravelError, reference_move, require_zero
 
 BY_CHANCE = 3
@@ -31,15 +28,15 @@ class HeldOutSteps:
         """Rejected poses of a set that prove nothing."""
         return BY_CHANCE if self.sets.allowances.scatters else 0
 
-    def next_step(self, state: RunState, phase: Phase) -> Step | None:
+    def next_step(self, state: RunState, phase: Phase) -> events.Step | None:
         """The next step of the first set that is not closed; None if all are."""
         for point in range(1, self.point_count + 1):
             key = SetKey(phase=phase, point=point)
             if not state.set(key).closed and not self._is_left(state, key):
-                return Locate() if state.position_unknown else self._in_set(state, key)
+                return events.Locate() if state.position_unknown else self._in_set(state, key)
         return None
 
-    def way_back(self, state: RunState, key: SetKey) -> Step:
+    def way_back(self, state: RunState, key: SetKey) -> events.Step:
         """The next move to the reference of a set; raises ``HexacellError`` if no safe path leads there."""
         # By the set's own moves, each of which was checked when it was chosen.
         is_in_order = not state.off_plan and (state.at_pose is None or state.at_pose[0] == key)
@@ -61,7 +58,7 @@ class HeldOutSteps:
         poses, common = self._poses(state, key)
         return not common or (not state.set(key).samples and not state.refused.allows(poses[0]))
 
-    def _in_set(self, state: RunState, key: SetKey) -> Step:
+    def _in_set(self, state: RunState, key: SetKey) -> events.Step:
         measured = state.set(key)
         require_zero(state, key)
         if measured.rejections and key.phase.has_new_geometry:
@@ -72,8 +69,7 @@ class HeldOutSteps:
         if step := self.sets.due_first(state, key, self.sets.ball_at_reference(state, key)):
             return step
         if (orientation := self._next_orientation(state, key)) is not None:
-            here = self.sets.at_pose(state, key, orientation)
-            return here or self._to_pose(state, key, orientation)
+            return self.sets.at_pose(state, key, orientation) or self._to_pose(state, key, orientation)
         if step := self.sets.at_reference(state, key):
             return step
         # The poses were chosen with a safe straight line back from each of them.
@@ -86,9 +82,9 @@ class HeldOutSteps:
         waiting = (number for number in range(1, len(poses) + 1) if number not in taken)
         return next((number for number in waiting if state.refused.allows(poses[number - 1])), None)
 
-    def _to_pose(self, state: RunState, key: SetKey, orientation: int) -> Move:
+    def _to_pose(self, state: RunState, key: SetKey, orientation: int) -> events.Move:
         poses, common = self._poses(state, key)
-        move = Move(at=key, orientation=orientation, pose=poses[orientation - 1])
+        move = events.Move(at=key, orientation=orientation, pose=poses[orientation - 1])
         if orientation == 1:
             return self.sets.towards(state, move)
         # Each list of poses was chosen with safe lines from one to the next, replacements apart.
@@ -98,7 +94,7 @@ class HeldOutSteps:
             return move
         return self.sets.towards(state, move, self.sets.ball_at_reference(state, key))
 
-    def _after_rejection(self, state: RunState, key: SetKey) -> Step | None:
+    def _after_rejection(self, state: RunState, key: SetKey) -> events.Step | None:
         """What follows when the ball has left the travel with the new geometry; None if its pose is next.
 
         A reading that could not be taken is no verdict: a gauge may have slipped. If the reference is as it
@@ -107,15 +103,15 @@ class HeldOutSteps:
         measured = state.set(key)
         if measured.rejections > 1 + self._by_chance:
             back = None if measured.reference_unverified else self._back(state, key)
-            return back or Judge()
+            return back or events.Judge()
         if not measured.reference_unverified:
             return None
         try:
             return self.sets.at_or_to_reference(state, key, self.sets.ball_at_reference(state, key))
         except LimitError:
-            return Judge()
+            return events.Judge()
 
-    def _back(self, state: RunState, key: SetKey) -> Move | None:
+    def _back(self, state: RunState, key: SetKey) -> events.Move | None:
         """The move to the reference after the ball has left the travel; None there, or without a safe path.
 
         The verdict is certain, and the old config is to be restored. Far from level, the joint variables
@@ -129,5 +125,5 @@ class HeldOutSteps:
         except LimitError:
             return None
 
-    def _to_reference(self, state: RunState, key: SetKey) -> Move:
+    def _to_reference(self, state: RunState, key: SetKey) -> events.Move:
         return self.sets.to_reference(state, key, self.sets.ball_at_reference(state, key))

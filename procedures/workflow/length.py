@@ -41,10 +41,9 @@ class LengthSteps:
 
     def planned_poses(self) -> tuple[tuple[str, Pose], ...]:
         """All poses with their names, if the fixture is where the cell file has it."""
-        keys = [SetKey(phase=Phase.LENGTH, point=mounting) for mounting in (1, 2)]
         return tuple(
             (f"length check, seat {key.seat}, orientation {number}", self._pose(key, number, np.zeros(3)))
-            for key in keys
+            for key in [SetKey(phase=Phase.LENGTH, point=mounting) for mounting in (1, 2)]
             for number in range(1, self._records + 1)
         )
 
@@ -76,8 +75,7 @@ class LengthSteps:
                 f"{key}: the controller refuses {move.target} in seat {key.seat} of the fixture",
                 action="Lower tilt_deg in [length_check], or put the fixture elsewhere",
             )
-        here = self.sets.at_pose(state, key)
-        return here or self.sets.towards(state, move, zero)
+        return self.sets.at_pose(state, key) or self.sets.towards(state, move, zero)
 
     def _pose(self, key: SetKey, orientation: int, off_mm: Array) -> Pose:
         """A pose of a mounting whose seat is ``off_mm`` (3,) from where the cell file has it."""

@@ -149,8 +149,7 @@ class Session:
                 del self._messages.for_status[:known]
             elif self.was_enabled:
                 await commands.read_errors()
-                messages = tuple(self._messages.for_status)
-                return ControllerStatus(estop, enabled, messages, heartbeat)
+                return ControllerStatus(estop, enabled, tuple(self._messages.for_status), heartbeat)
             return ControllerStatus(estop, enabled, heartbeat=heartbeat)
 
     async def joints(self) -> tuple[float, ...] | None:

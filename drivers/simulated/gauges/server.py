@@ -180,8 +180,7 @@ class GaugeLineServer(Closeable):
         if self._next_unasked is not None:
             times.append(self._next_unasked)
         until_next_s = max(0.0, self._clock.real_seconds(min(times) - self._clock.now())) if times else None
-        watched = [self._wake_read, *self._line.descriptors()]
-        ready, _, _ = select.select(watched, [], [], until_next_s)
+        ready, _, _ = select.select([self._wake_read, *self._line.descriptors()], [], [], until_next_s)
         if self._wake_read in ready:
             os.read(self._wake_read, COMMAND_LIMIT)
             while not self._jobs.empty():

@@ -62,8 +62,7 @@ def _search(options: argparse.Namespace, console: Console) -> ExitCode:
     for port in options.ports:
         _require_port(port)
     buses = [_bus(words) for words in options.can]
-    address = _address(options.controller)
-    found = asyncio.run(search_devices(options.ports, buses, address))
+    found = asyncio.run(search_devices(options.ports, buses, _address(options.controller)))
     text = found_devices.cell_text(found)
     console.document(asdict(found) | {"cell": text})
     for line in found_devices.search_lines(found):
@@ -95,8 +94,7 @@ def _write(found: SearchFindings, path: Path, console: Console) -> ExitCode:
 def _watch(options: argparse.Namespace, console: Console) -> ExitCode:
     if options.cell is None:
         raise UsageError("--diagnose wants the cell of the device", action="Add --cell CELL")
-    cell = cell_at(options.cell, console)
-    found = asyncio.run(diagnose(cell, options.diagnose, options.seconds))
+    found = asyncio.run(diagnose(cell_at(options.cell, console), options.diagnose, options.seconds))
     console.document({**asdict(found), "is_usable": found.is_usable})
     for line in found_devices.diagnosis_lines(found):
         console.print(wrapped(line))

@@ -162,9 +162,8 @@ def execute_run(request: RunRequest, console: Console, further: Sequence[Listene
     Ctrl-C, or any signal that ends a process, ends it after the step in progress, a second Ctrl-C at once.
     Raises ``HexacellError``.
     """
-    listed = pose_list_of(request.cell)
     expected = expected_records(
-        request.cell.settings, request.mode, listed, length_check=request.length_check
+        request.cell.settings, request.mode, pose_list_of(request.cell), length_check=request.length_check
     )
     progress = RunProgress(console, expected)
     signals = SignalCommands(console)

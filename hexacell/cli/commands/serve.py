@@ -39,8 +39,7 @@ async def _serve_results(cell: Cell, settings: OpcUaSettings, console: Console) 
 
 def simulate(options: argparse.Namespace, console: Console) -> ExitCode:
     """Serve until interrupted; stdout gets a cell file with the addresses of the served devices."""
-    cell = require_simulation(cell_at(options.cell, console))
-    return _until_stopped(_serve_cell(cell, options))
+    return _until_stopped(_serve_cell(require_simulation(cell_at(options.cell, console)), options))
 
 
 async def _serve_cell(cell: Cell, options: argparse.Namespace) -> None:

@@ -115,8 +115,7 @@ def design_picture(study: DesignStudy) -> str:
 
 
 def _draw_sweep(axes: Any, name: str, rows: Mapping[float, Spread]) -> None:  # noqa: ANN401 - matplotlib's
-    shown = [(value, one.task_mm) for value, one in rows.items() if isfinite(one.task_mm)]
-    x, y = columns(shown)
+    x, y = columns([(value, one.task_mm) for value, one in rows.items() if isfinite(one.task_mm)])
     axes.plot(x, y, "s-", color=AFTER, markersize=4)
     axes.set_xlabel(name)
     if name.startswith("noise"):

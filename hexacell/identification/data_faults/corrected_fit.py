@@ -61,8 +61,7 @@ class CorrectedFit:
 
     def corrected_for(self, hypothesis: hypotheses.FaultHypothesis) -> CorrectedFit:
         """The fit after correction for one more fault."""
-        problem = hypothesis.corrected(self.problem)
-        return self.fitted(self.original, problem, (*self.faults, hypothesis))
+        return self.fitted(self.original, hypothesis.corrected(self.problem), (*self.faults, hypothesis))
 
     @property
     def rejected(self) -> list[RecordId]:

@@ -247,8 +247,7 @@ def _greedy_deletion(start: CorrectedFit) -> CorrectedFit:
     """Leave out the records of the most likely hypothesis, one after another with a refit in between."""
     now, found = start, 0
     while found < LARGEST_REJECTED_SHARE * start.problem.records and not now.is_consistent:
-        hypotheses = now.likely_hypotheses()
-        removing = (one for one in hypotheses if not isinstance(one, GaugeFaultHypothesis))
+        removing = (one for one in now.likely_hypotheses() if not isinstance(one, GaugeFaultHypothesis))
         trial = next(filter(None, (refitted(now, hypothesis) for hypothesis in removing)), None)
         if trial is None:
             break

@@ -164,8 +164,7 @@ def choose_frames(
     frames = convention.inverse()
     if len(targets):
         freedom = replace(mechanism.frame_freedom, base="")  # gauges measure along the axes of the base
-        change = closest_frames(freedom, length, frames.poses(reached_poses), targets)
-        frames = frames.then(change)
+        frames = frames.then(closest_frames(freedom, length, frames.poses(reached_poses), targets))
     return FrameChoice(
         mechanism.change_frames(new, frames),
         frames,

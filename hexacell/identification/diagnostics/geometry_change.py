@@ -46,5 +46,4 @@ def largest_change(
         step[fitter.frame_columns] = solved[:turned] * fitter.frame_scales
         frames, offset = frames.then(small_change(step)), offset + solved[turned:]
     differences = fitter.difference(frames) + ball @ offset
-    changes = differences * fitter.widths / before.parameters.like_a_mm
-    return float(np.abs(changes).max())
+    return float(np.abs(differences * fitter.widths / before.parameters.like_a_mm).max())

@@ -46,8 +46,7 @@ def update(found: Identification, further: Problem) -> Identification:
     started = further.started_at(found.free)
     if found.terms is not None:
         started = started.with_terms(found.terms.terms, found.terms.values)
-    both = used.joined(started)
-    kept, solution = solve_around_singularities(both, found.active_prior, FINE)
+    kept, solution = solve_around_singularities(used.joined(started), found.active_prior, FINE)
     if not np.isin(kept.labels[:, 0], further.labels[:, 0]).any():
         raise IdentifiabilityError(
             "no geometry near the identified one has a pose at any held-out record",
@@ -65,10 +64,9 @@ def leave_one_point_out(found: Identification) -> tuple[PointPrediction, ...]:
     """Each point's records predicted by the others, where those determine the geometry."""
     costs = LinearCosts.at(found.problem, found.prediction)
     points = found.problem.labels[:, 0]
-    each = ((int(point), points == point) for point in np.unique(points))
     return tuple(
         PointPrediction(point, _prediction_test(costs, rows))
-        for point, rows in each
+        for point, rows in ((int(point), points == point) for point in np.unique(points))
         if found.problem.subset(~rows).is_determined
     )
 

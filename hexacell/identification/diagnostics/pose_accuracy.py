@@ -74,12 +74,11 @@ def predicted_accuracy(belief: RobotBelief, *, task: PoseBatch, workspace: PoseB
         before = before + by_terms @ terms.left_by(belief.corrections)
     jacobian = error_jacobian(belief, task, workspace)
     # The trace of a covariance is the mean square length.
-    mean_squares = np.einsum("nap,pq,naq->na", jacobian, belief.covariance, jacobian)
     return Accuracy(
         poses=task,
         reachable=task_reachable,
         before=PoseErrors.of_squares(before**2),
-        after=PoseErrors.of_squares(mean_squares),
+        after=PoseErrors.of_squares(np.einsum("nap,pq,naq->na", jacobian, belief.covariance, jacobian)),
     )
 
 

@@ -257,8 +257,7 @@ class ToleranceFitter:
 
     def _in(self, frames: FrameTransform, vector: Array) -> Array:
         """Parameters (P,) in other frames."""
-        geometry = Geometry(self.drawing.parameters, vector)
-        return self.mechanism.change_frames(geometry, frames).vector
+        return self.mechanism.change_frames(Geometry(self.drawing.parameters, vector), frames).vector
 
 
 class _Step:
@@ -296,8 +295,7 @@ class _Step:
         """The best values; ``reach`` is the largest turn, rad, and limits shifts in proportion."""
         from scipy.optimize import lsq_linear  # noqa: PLC0415 - only where a geometry is checked
 
-        count = self.columns.shape[1]
-        choosing = SMALLEST_ERRORS * np.eye(count)[self.frame_count :]
+        choosing = SMALLEST_ERRORS * np.eye(self.columns.shape[1])[self.frame_count :]
         largest = np.concatenate([np.full(self.frame_count, reach), np.ones(3), self.largest])
         solved = lsq_linear(
             np.vstack([self.columns, choosing]),

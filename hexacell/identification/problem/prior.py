@@ -180,8 +180,7 @@ class Prior:
         factor = np.vstack([widths[:, None] * by_parameters, tolerances.ball_mm * (ball @ by_parameters)])
         own = np.vstack([np.diag(widths), tolerances.ball_mm * ball])
         own_sigma = np.linalg.norm(own, axis=0)[mechanism.convention.free_rows] / np.sqrt(3.0)
-        free = mechanism.convention.free_parameters(centre)
-        return cls(centre, free, factor.T @ factor / 3.0, own_sigma)
+        return cls(centre, mechanism.convention.free_parameters(centre), factor.T @ factor / 3.0, own_sigma)
 
     @property
     def sigma(self) -> Array:
@@ -249,8 +248,7 @@ def drift_sigma(mechanism: Mechanism, sigma_mm: float, tolerances: Tolerances) -
     """
     parameters, widths = mechanism.parameters, tolerances.widths(mechanism.parameters)
     is_length = np.array([p.kind.unit is ParameterUnit.MM for p in parameters.parameters])
-    share = sigma_mm / widths[is_length].max()
-    return np.where(is_length, sigma_mm, share * widths)
+    return np.where(is_length, sigma_mm, (sigma_mm / widths[is_length].max()) * widths)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -182,8 +182,7 @@ class Problem:
     @property
     def stations(self) -> NDArray[np.intp]:
         """The row (n,) of each record's point among the points."""
-        lengths = np.diff(np.append(self.first_rows, self.records))
-        return np.arange(self.points).repeat(lengths)
+        return np.arange(self.points).repeat(np.diff(np.append(self.first_rows, self.records)))
 
     def per_record(self, values: Array) -> Array:
         """A value of each point (m, ...), repeated for each of its records (n, ...)."""

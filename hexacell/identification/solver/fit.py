@@ -126,8 +126,7 @@ def fit_regularized(
     ratios, directions = np.linalg.eigh(factor.T @ (correction * first.information) @ factor)
     unreleased = np.linalg.solve(factor.T, directions[:, ratios < RELEASE_RATIO])
     active_prior = unreleased @ unreleased.T
-    second = solve(kept, active_prior, first.prediction, FINE)
-    return Identification(kept, second, active_prior)
+    return Identification(kept, solve(kept, active_prior, first.prediction, FINE), active_prior)
 
 
 def solve_around_singularities(

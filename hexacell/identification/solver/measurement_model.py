@@ -201,8 +201,7 @@ class NuisanceElimination:
     def cost(self, residuals: Array) -> float:
         """The weighted sum of squares of centred residuals (n, 3), priors included."""
         r, penalties = self._reduced(residuals)
-        weighted = np.einsum("ni,nij,nj->", r, self._weights, r)
-        return float(weighted + np.sum(penalties**2))
+        return float(np.einsum("ni,nij,nj->", r, self._weights, r) + np.sum(penalties**2))
 
     def nuisance_covariance(self) -> Array:
         """Covariance (n, 3, 3), mm^2, of what is subtracted from each record."""
@@ -219,8 +218,7 @@ class NuisanceElimination:
 
     def _reduced(self, values: Array) -> tuple[Array, Array]:
         """Centred values, and the rows (r, k) that the priors add to the sum of squares."""
-        flat = values.reshape(*values.shape[:2], -1)
-        reduced, penalties = self._without_stations(flat)
+        reduced, penalties = self._without_stations(values.reshape(*values.shape[:2], -1))
         if len(self._sigmas):
             best = self.common_covariance @ self._gram(reduced, penalties)
             reduced = reduced - self._common_design @ best

@@ -32,8 +32,7 @@ def restarts(problem: Problem) -> Iterator[Problem]:
     for row, (free, poses) in enumerate(reached):
         prediction = predict(problem, free, poses)
         if not prediction.singular.any():
-            elimination = NuisanceElimination(problem, prediction.weights)
-            costs[row] = elimination.cost(prediction.residuals)
+            costs[row] = NuisanceElimination(problem, prediction.weights).cost(prediction.residuals)
     order = np.argsort(costs, kind="stable")[:START_POINTS]
     for row in order[np.isfinite(costs[order])]:
         yield problem.starting_at(*reached[row])
@@ -57,6 +56,5 @@ def _with_poses(problem: Problem, starts: Array) -> Iterator[tuple[Array, PoseBa
         vectors = np.repeat(some @ problem.basis.T, records, axis=0)
         geometries = GeometryBatch(problem.mechanism.parameters, vectors)
         solved = problem.commands[rows].solve_poses(geometries, problem.joints[rows])
-        found = solved.found.reshape(len(some), records).all(axis=1)
-        for start in np.flatnonzero(found):
+        for start in np.flatnonzero(solved.found.reshape(len(some), records).all(axis=1)):
             yield some[start], solved.poses[start * records + np.arange(records)]

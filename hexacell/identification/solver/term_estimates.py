@@ -72,8 +72,7 @@ class TermEstimates:
 
     def left_by(self, corrections: Corrections) -> Array:
         """What of the coefficients (6 m,) a controller with some corrections does not correct."""
-        corrected = np.concatenate([corrections.of(term.name) for term in self.terms])
-        return np.asarray(self.values - corrected)
+        return np.asarray(self.values - np.concatenate([corrections.of(term.name) for term in self.terms]))
 
     def joint_covariance(self, of_parameters: Array) -> Array:
         """Covariance (p + 6 m, p + 6 m) of the free parameters (p, p) and the coefficients."""

@@ -87,8 +87,7 @@ class SixRails(JointedLegs):
 
     def branch(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
         _, v = self.leg_vectors(geometry, poses, joints)
-        along = np.einsum("nij,ij->ni", v, _directions(geometry))
-        return np.where(along < 0.0, -1, 1)
+        return np.where(np.einsum("nij,ij->ni", v, _directions(geometry)) < 0.0, -1, 1)
 
     def convention_frames(self, geometry: Geometry) -> FrameTransform:
         """Rail 1 along z from the origin, slider 3 at y = 0, x > 0; the platform's joints 1, 3 and 5."""

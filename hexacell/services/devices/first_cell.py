@@ -196,8 +196,7 @@ class CellDraft:
         """
         OutputFile(self.path, NEW_CELL).write(self._text(self.given).encode())
         try:
-            cell = load_cell(self.path)
-            require_stated_poses(cell)
+            require_stated_poses(load_cell(self.path))
         except HexacellError:
             self.path.unlink()
             raise

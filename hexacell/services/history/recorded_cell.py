@@ -73,8 +73,7 @@ def commanding_geometries(folder: RunFolder, settings: CellSettings) -> tuple[Co
     own = CommandingGeometry.of(mechanism, Geometry.of(parameters, started.controller))
     if state.provisional is None:
         return (own,)
-    lent = Geometry.of(parameters, state.provisional.geometry)
-    return own, CommandingGeometry(lent, own.frames)
+    return own, CommandingGeometry(Geometry.of(parameters, state.provisional.geometry), own.frames)
 
 
 def _state_of(folder: RunFolder, settings: CellSettings) -> RunState:

@@ -67,8 +67,7 @@ def require_own_run(cell: Cell, folder: RunFolder, state: RunState, *, is_resume
     Raises ``FileError`` if a file in it is a link, names another config, or has a geometry or a pose that
     is not of this robot.
     """
-    folders = (folder.path, folder.path / PROVISIONAL_FOLDER)
-    for path in folders:
+    for path in (folder.path, folder.path / PROVISIONAL_FOLDER):
         _require_no_links(path)
         if (path / RECEIPT).exists():
             _require_own_config(cell, path / RECEIPT, Receipt.of(path).paths)
@@ -146,8 +145,7 @@ def _require_own_poses(cell: Cell, folder: RunFolder, state: RunState, started: 
         reached |= robot.limits_with(geometry).allow_joints(joints)
     allowed = reached & robot.limits.allow_commands(robot.frames.poses(batch))
     if not allowed.all():
-        wrong = poses[int(np.flatnonzero(~allowed)[0])]
-        pose = ", ".join(f"{number:g}" for number in wrong)
+        pose = ", ".join(f"{number:g}" for number in poses[int(np.flatnonzero(~allowed)[0])])
         raise FileError(
             f"has the pose {pose}, which the robot cannot take", subject=folder.journal, action=RESTORE
         )

@@ -76,8 +76,7 @@ class NoticeOutbox:
             FileError: they cannot be removed.
         """
         waiting = self.pending()
-        young = [one for one in waiting if one.notice.at > now - LONGEST_KEPT]
-        kept = young[-MOST_KEPT:]
+        kept = [one for one in waiting if one.notice.at > now - LONGEST_KEPT][-MOST_KEPT:]
         for one in waiting:
             if one not in kept:
                 self.forget(one)

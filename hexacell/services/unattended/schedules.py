@@ -213,5 +213,4 @@ def _verified(units: Sequence[Path]) -> tuple[str, ...]:
     except (OSError, subprocess.TimeoutExpired):
         return ()
     names = [path.name for path in units]
-    lines = done.stderr.splitlines()
-    return tuple(line for line in lines if any(name in line for name in names))
+    return tuple(line for line in done.stderr.splitlines() if any(name in line for name in names))

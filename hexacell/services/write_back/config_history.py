@@ -143,8 +143,7 @@ def _noted_in(entry: Entry, state: RunState, run: RunFolder, receipt: Receipt) -
         case events.Committed(approved_by=by):
             yield _record(WriteKind.RESULT, entry.at, by, run, receipt)
         case events.RolledBack() if state.committed is not None:
-            why = reason_to_take_back(state)
-            yield _record(WriteKind.TAKEN_BACK, entry.at, THE_RUN, run, receipt, why)
+            yield _record(WriteKind.TAKEN_BACK, entry.at, THE_RUN, run, receipt, reason_to_take_back(state))
 
 
 def _record(

@@ -145,8 +145,7 @@ async def require_as_recorded(proposal: Proposal) -> None:
 
 def approval_question(proposal: Proposal) -> Question:
     """What a person is asked before it is written, with the gates that may refuse it."""
-    pending = pending_change(proposal.state, proposal.change, proposal.gates)
-    return ask_approval(pending, cell=proposal.cell)
+    return ask_approval(pending_change(proposal.state, proposal.change, proposal.gates), cell=proposal.cell)
 
 
 async def apply_proposal(

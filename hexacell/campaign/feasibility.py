@@ -148,22 +148,22 @@ def _blocked_lines(plan: Plan) -> Iterator[HexacellError]:
     belief = plan.robot.belief()
     references = {point: plan.robot.from_commands([plan.reference_pose(point)]) for point in plan.points}
     any_order = plan.settings.identification.choose_points
-    for start, end in combinations(plan.points, 2) if any_order else pairwise(plan.points):
-        if not is_clear(belief, references[start], references[end]):
-            yield _blocked_line(f"identification points {start} and {end}")
+    lines = [
+        (f"identification points {start} and {end}", references[start], references[end])
+        for start, end in (combinations(plan.points, 2) if any_order else pairwise(plan.points))
+    ]
     for point in plan.points if plan.pose_list is not None else ():
         listed = plan.robot.from_commands(plan.poses_at(point))
         for row in range(1, len(listed)):
-            if not is_clear(belief, listed[[row - 1]], listed[[row]]):
-                yield _blocked_line(f"point {point}, poses {row} and {row + 1} of the list")
-
-
-def _blocked_line(ends: str) -> ReachError:
-    return ReachError(
-        "the straight line between them leaves the joint ranges or comes next to a singularity",
-        subject=ends,
-        action="Put one between them, or change their order",
-    )
+            ends = f"point {point}, poses {row} and {row + 1} of the list"
+            lines.append((ends, listed[[row - 1]], listed[[row]]))
+    for ends, start, end in lines:
+        if not is_clear(belief, start, end):
+            yield ReachError(
+                "the straight line between them leaves the joint ranges or comes next to a singularity",
+                subject=ends,
+                action="Put one between them, or change their order",
+            )
 
 
 def _points_without_poses(plan: Plan) -> Iterator[list[HexacellError]]:
@@ -296,8 +296,7 @@ def _of_command(robot: Robot, pose: Pose) -> Iterator[str]:
 
 
 def _of_legs(robot: Robot, poses: PoseBatch, joints: Array) -> Iterator[str]:
-    limits = robot.limits.legs
-    if limits is None:
+    if (limits := robot.limits.legs) is None:
         return
     legs = robot.mechanism.legs(robot.commanding, poses, joints)
     spare = limits.spare_angles(legs)[0]

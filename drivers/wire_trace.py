@@ -138,8 +138,7 @@ def read_trace(text: str) -> tuple[TraceEntry, ...]:
     for number, line in enumerate(text.splitlines(), 1):
         if line.startswith("#"):
             continue
-        match = ENTRY.fullmatch(line)
-        if match is None:
+        if (match := ENTRY.fullmatch(line)) is None:
             raise FileError(
                 f"line {number} is no entry of a wire trace: {line[:60]!r}",
                 action="Take it from a run's `wire`",

@@ -134,8 +134,7 @@ def _announced(group: Group, path: tuple[str, ...]) -> EntryPoints:  # noqa: ARG
 
 def _only(group: Group, name: str) -> EntryPoint:
     points = _announced(group, tuple(sys.path)).select(name=name)
-    by_target = {point.value: point for point in points}
-    if not by_target:
+    if not (by_target := {point.value: point for point in points}):
         known = names(group)
         action = did_you_mean(name, known) or f"Known are: {', '.join(known) or 'none'}"
         raise UsageError(f"there is no {group.noun} '{name}'", action=action)

@@ -52,8 +52,7 @@ def traffic(entries: Iterable[TraceEntry], line: str) -> tuple[Answers, list[Rec
         ValueError: the trace has nothing of it.
     """
     entries = list(entries)
-    said = [entry for entry in entries if entry.line == line]
-    if not said:
+    if not (said := [entry for entry in entries if entry.line == line]):
         others = ", ".join(sorted({entry.line for entry in entries})) or "none"
         raise ValueError(f"the trace has no line {line!r}; its lines: {others}")
 
@@ -201,8 +200,7 @@ class recorded_bus(_Served[Mapping[str, Any]]):  # noqa: N801
         self._bus = can.Bus(**self._address)
 
     def _serve_once(self) -> None:
-        message = self._bus.recv(self._wait_s())
-        if message is None:
+        if (message := self._bus.recv(self._wait_s())) is None:
             return
         self._schedule(self._unasked)  # the line is open now
         self._unasked = ()
@@ -213,8 +211,7 @@ class recorded_bus(_Served[Mapping[str, Any]]):  # noqa: N801
         self._schedule((left.popleft() if len(left) > 1 else left[0]).answers)
 
     def _send(self, data: bytes) -> None:
-        match = FRAME.fullmatch(data.decode())
-        if match is None:
+        if (match := FRAME.fullmatch(data.decode())) is None:
             raise ValueError(f"{data!r} is no frame of a trace")
         number, content = int(match["id"], 16), bytes.fromhex(match["data"])
         self._bus.send(can.Message(arbitration_id=number, data=content, is_extended_id=False))

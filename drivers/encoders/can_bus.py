@@ -214,8 +214,7 @@ def is_canopen(message: can.Message) -> bool:
 
 def _read_as_lines(bus: can.BusABC) -> can.BusABC:
     """The bus; python-can's slcan drops lines that begin with a line feed, or with a late z or Z."""
-    port = getattr(bus, "serialPortOrig", None)
-    if port is not None:
+    if (port := getattr(bus, "serialPortOrig", None)) is not None:
         read = port.read
         port.read = lambda size=1: read(size).translate(LINE_STARTS)
     return bus

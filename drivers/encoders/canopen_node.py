@@ -59,8 +59,7 @@ class EncoderNode:
 
     def read(self, entry: ObjectEntry) -> int:
         """The value of a mandatory entry."""
-        value = self.read_optional(entry)
-        if value is None:
+        if (value := self.read_optional(entry)) is None:
             raise DeviceError(
                 f"has no {entry}",
                 subject=self.leg.subject,

@@ -145,8 +145,7 @@ def read_settings(node: EncoderNode) -> str:
     the joint. They are part of the identity, which every run records and compares.
     """
     words = []
-    parameters = node.read_optional(od.OPERATING_PARAMETERS)
-    if parameters is not None:
+    if (parameters := node.read_optional(od.OPERATING_PARAMETERS)) is not None:
         direction = "reversed, " if parameters & REVERSED else ""
         words.append(f"operating parameters {direction}{parameters:#06x}")
     for name, entry in (("preset", od.PRESET), ("offset", od.OFFSET)):

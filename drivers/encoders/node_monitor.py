@@ -189,9 +189,7 @@ class AlarmPoll:
             if node.read_optional(entry) is not None
         ]
         # A warning that is there at the opening is a remark then, and need not end every run.
-        self._known = {
-            (node, entry): node.read(entry) for node, entry in self._entries if entry is WARNINGS
-        }
+        self._known = {(node, one): node.read(one) for node, one in self._entries if one is WARNINGS}
         self.begin_sample()
         self.check()
 

@@ -97,8 +97,7 @@ def follow_plain_sync(node: EncoderNode) -> None:
 
 
 def _read(node: EncoderNode, number: int) -> Tpdo | None:
-    cob_id = node.read_optional(od.tpdo_parameter(number, od.COB_ID))
-    if cob_id is None:
+    if (cob_id := node.read_optional(od.tpdo_parameter(number, od.COB_ID))) is None:
         return None
     slots = range(1, node.read(od.tpdo_mapping(number, 0)) + 1)
     return Tpdo(
@@ -110,8 +109,7 @@ def _read(node: EncoderNode, number: int) -> Tpdo | None:
 
 
 def _set_up(node: EncoderNode, tpdo: Tpdo, kind: DeviceType) -> PositionChannel:
-    offset = tpdo.position_offset
-    if offset is None:
+    if (offset := tpdo.position_offset) is None:
         node.write(od.tpdo_mapping(tpdo.number, 0), 0)
         node.write(od.tpdo_mapping(tpdo.number, 1), _mapping_parameter(kind.position))
         node.write(od.tpdo_mapping(tpdo.number, 0), 1)

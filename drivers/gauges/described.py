@@ -100,8 +100,7 @@ class StreamGauge(_DescribedGauge, StreamingGauge):
         text = frame.decode("latin-1")
         if self._is_at_end(text):
             return Origin.OWN
-        match = re.fullmatch(self.frame.answer, text)
-        if match is None:
+        if (match := re.fullmatch(self.frame.answer, text)) is None:
             return Origin.UNKNOWN
         if self.channel is None:
             return Origin.OWN

@@ -25,8 +25,7 @@ class HeidenhainGauge(ValueOnlyGauge):
     value_request = b"\x02"
 
     def _parse_value(self, frame: bytes) -> DisplayedValue:
-        match = HEIDENHAIN_VALUE.fullmatch(frame)
-        if match is None:
+        if (match := HEIDENHAIN_VALUE.fullmatch(frame)) is None:
             raise FrameRejected(frame)
         if match[3] == b"?":
             raise self._voided(f"has lost the signal of its probe ({match[0].decode('ascii').strip()})")

@@ -31,8 +31,7 @@ class KeyenceGauge(ValueOnlyGauge):
         if error := KEYENCE_ERROR.fullmatch(frame):
             problem = f"reports error {error[1].decode('ascii')} instead of its value"
             raise self._error(DeviceError, problem, "Look it up in the manual of the DL-RS1A")
-        match = KEYENCE_VALUES.fullmatch(frame)
-        if match is None:
+        if (match := KEYENCE_VALUES.fullmatch(frame)) is None:
             raise FrameRejected(frame)
         values, place = match[1].split(b",")[1:], self.settings.channel
         if not 1 <= place <= len(values):

@@ -38,7 +38,6 @@ class UwaveGauge(StreamingGauge):
         return Origin.STATUS if UWAVE_STATUS.fullmatch(frame) else Origin.UNKNOWN
 
     def _parse_value(self, frame: bytes) -> DisplayedValue:
-        match = UWAVE_VALUE.fullmatch(frame)
-        if match is None:
+        if (match := UWAVE_VALUE.fullmatch(frame)) is None:
             raise FrameRejected(frame)
         return DisplayedValue.of(match[2], match[3], frame, UWAVE_UNITS[match[4]])

@@ -89,9 +89,7 @@ class ModbusPort(RequestPort):
         """Open the line unless it is open; how often it has been opened."""
         self.require_not_closed()
         if self._client is None:
-            line: dict[str, Any] = {
-                name: self._settings[name] for name in LINE_KEYS if name in self._settings
-            }
+            line: dict[str, Any] = {one: self._settings[one] for one in LINE_KEYS if one in self._settings}
             self._modbus = optional("pymodbus", EXTRA, self.subject)
             client = optional("pymodbus.client", EXTRA, self.subject).ModbusSerialClient(
                 self.url, retries=0, trace_packet=self._note, **line

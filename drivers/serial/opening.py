@@ -237,9 +237,7 @@ class ParityInBit7:
 
     def decode(self, data: bytes) -> bytes:
         """The bytes without their parity; ``DAMAGED`` where it is wrong."""
-        return bytes(
-            byte & ~BIT_7 if byte >> 7 == self._parity_of(byte & ~BIT_7) else DAMAGED for byte in data
-        )
+        return bytes(one & ~BIT_7 if one >> 7 == self._parity_of(one & ~BIT_7) else DAMAGED for one in data)
 
     def _parity_of(self, character: int) -> int:
         return (character.bit_count() + self._odd) % 2

@@ -77,8 +77,7 @@ class Motion:
         position = self.path_position(now_s)
         below = min(int(position), len(self.path) - 2)
         share = position - below
-        joints: Array = (1.0 - share) * self.path[below] + share * self.path[below + 1]
-        return joints
+        return np.asarray((1.0 - share) * self.path[below] + share * self.path[below + 1])
 
 
 class GaugePlaces:
@@ -320,5 +319,4 @@ class RobotPhysics:
         motion = self._settings.motion
         decay = np.exp(-since_s / motion.ringing_s) * np.cos(2.0 * np.pi * RINGING_HZ * since_s)
         direction = self._ringing_direction
-        ringing: Array = motion.ringing_mm * decay * direction / np.linalg.norm(direction)
-        return ringing
+        return np.asarray(motion.ringing_mm * decay * direction / np.linalg.norm(direction))

@@ -137,8 +137,7 @@ class SocketLine:
         return data
 
     def send(self, data: bytes, wait_s: float = 0.0) -> None:
-        client = self._client
-        if client is not None:
+        if (client := self._client) is not None:
             with suppress(OSError, ValueError):  # the client may be dropped meanwhile
                 _write_or_drop(client.fileno(), data, wait_s)
 

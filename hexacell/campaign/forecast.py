@@ -59,8 +59,7 @@ class Forecaster:
         self, state: CampaignState, belief: RobotBelief, selected: SelectedPose | None = None
     ) -> Forecast | None:
         """The effect of a selected record and of completing the plan; None without task poses."""
-        error = self._error(state, belief)
-        if error is None:
+        if (error := self._error(state, belief)) is None:
             return None
         now = after = error.worst(belief.covariance)
         if selected is not None:
@@ -107,8 +106,7 @@ class Forecaster:
 
         And the point that takes most off the mean square error per minute.
         """
-        error = self.task.error(belief)
-        if error is None:
+        if (error := self.task.error(belief)) is None:
             return dict.fromkeys(points, math.inf), points[0]
         error = TaskError(error.jacobian)  # that of all parameters, which records improve whatever is held
         information = PlannedInformation.of(self.sets_at(points), belief)

@@ -225,8 +225,7 @@ def _from_other_starts(problem: Problem, found: Identification) -> Identificatio
     """
     best, same, others = found, 0, _estimates_from_other_starts(problem)
     while same < SAME_MINIMUM and not _is_plausible(problem, best):
-        other = next(others, None)
-        if other is None:
+        if (other := next(others, None)) is None:
             break
         is_better = (other.records, -cost(other)) > (best.records, -cost(best))
         is_near = abs(cost(other) - cost(best)) <= SAME_COST * cost(best)
@@ -249,8 +248,7 @@ def _estimates_from_other_starts(problem: Problem) -> Iterator[Identification]:
 
 def _continued(problem: Problem, before: Identification) -> Identification:
     """The estimate from one of fewer or other records; from the drawing where a pose is not found."""
-    poses = _start_poses(problem, before)
-    if poses is None:
+    if (poses := _start_poses(problem, before)) is None:
         return estimate_online(problem)
     # While the records leave much open, undamped steps may diverge.
     options = INCREMENTAL if problem.is_determined else COARSE

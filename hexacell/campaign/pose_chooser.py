@@ -72,8 +72,7 @@ class PoseChooser:
             LimitError: there is no pose, or no path to it, within the limits.
         """
         for selected, start in self._selections(belief, zero, state):
-            path = self._path(belief, zero, state, selected, start)
-            if path is not None:
+            if (path := self._path(belief, zero, state, selected, start)) is not None:
                 return selected, path
         raise LimitError("no safe straight line starts here")
 

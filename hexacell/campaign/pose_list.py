@@ -38,8 +38,7 @@ def pose_list_of(cell: Cell) -> PoseList | None:
     Raises:
         FileError: it cannot be read, or its points are not those of the cell file.
     """
-    name = cell.settings.identification.poses
-    if name is None:
+    if (name := cell.settings.identification.poses) is None:
         return None
     path = cell.path.parent / name
     points = len(cell.settings.identification.points)

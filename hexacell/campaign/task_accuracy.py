@@ -115,8 +115,7 @@ class Task:
         Zeros alone are those with which the ``recorded`` poses will err least; without them, those of the
         workspace.
         """
-        jacobian = self.jacobian(belief)
-        if jacobian is None:
+        if (jacobian := self.jacobian(belief)) is None:
             return None
         return TaskError(jacobian[:, :3], self.held, self._gain(belief, recorded))
 

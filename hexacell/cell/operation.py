@@ -34,8 +34,7 @@ class ArchiveSettings(Section):
 
 def mistake_in_url(url: str) -> tuple[str, str] | None:
     """What is wrong with the address of a shared archive, and what to do; None if nothing is."""
-    found = _POSTGRESQL.fullmatch(url)
-    if found is None:
+    if (found := _POSTGRESQL.fullmatch(url)) is None:
         return "this is no address of a PostgreSQL database", "Write postgresql://user@host/database"
     if ":" in (found["login"] or "") or "password" in (found["query"] or ""):
         return "a password does not belong here", "Put it into ~/.pgpass, and remove it"

@@ -59,8 +59,7 @@ class ScaledEstimate:
     @classmethod
     def of(cls, scale: float, estimate: OnlineEstimate, records: int) -> "ScaledEstimate":
         """An estimate of so many records; one that leaves some of them out is the least likely."""
-        found = estimate.identification
-        if found is None:
+        if (found := estimate.identification) is None:
             return cls(scale, estimate, 0.0)
         is_whole = found.records == records
         return cls(scale, estimate, found.log_marginal_likelihood if is_whole else -np.inf)

@@ -176,9 +176,7 @@ def diff_of_files(paths: Sequence[Path], before: Contents, after: Contents) -> s
 def diff(before: str, after: str, names: tuple[str, str] = ("config-before", "config-after")) -> str:
     """The text change as a unified diff that ``patch`` accepts; empty if there is none."""
     lines = difflib.unified_diff(_lines(before), _lines(after), *names)
-    return "".join(
-        line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n" for line in lines
-    )
+    return "".join(one if one.endswith("\n") else f"{one}\n\\ No newline at end of file\n" for one in lines)
 
 
 def _lines(text: str) -> list[str]:

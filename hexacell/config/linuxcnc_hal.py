@@ -77,8 +77,7 @@ class HalText:
         Raises:
             FileError: it is not set, or twice, or to a variable of the INI file.
         """
-        tokens = self._tokens[key]
-        if not tokens:
+        if not (tokens := self._tokens[key]):
             raise FileError(
                 f"no line sets the pin {key}",
                 subject=self.source,

@@ -124,8 +124,7 @@ def _with_keys(text: str, added: Mapping[str, str]) -> str:
         return text
     document, end = TomlDocument.parse(text), "\r\n" if "\r\n" in text else "\n"
     lines = [f"{key} = {value}" for key, value in added.items()]
-    table = document.spans.get((TABLE,))
-    if table is None:
+    if (table := document.spans.get((TABLE,))) is None:
         new = end.join(["", REMARK, f"[{TABLE}]", *lines, ""])
         return text + (end if text and not text.endswith("\n") else "") + new
     last = max(span.stop for path, span in document.spans.items() if path[0] == TABLE)

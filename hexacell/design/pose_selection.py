@@ -81,8 +81,7 @@ def select_pose(
     space = CandidateSpace(
         belief, zero, lambda some: criterion.gain(covariance, some.jacobian, some.covariance)
     )
-    candidates = space.rated(orientations @ zero.orientation)
-    if candidates is None:
+    if (candidates := space.rated(orientations @ zero.orientation)) is None:
         raise LimitError("no orientation is within reach, joint range, tilt limit and singularity margin")
     if len(candidates):
         candidates = space.refined(candidates, rounds)[:MOST_CANDIDATES]

@@ -131,8 +131,7 @@ class DriftWatch:
     @property
     def share_of_limit(self) -> Array:
         """The sums (m,) as shares of their limit."""
-        shares: Array = self._sums.max(axis=0) / alarm_limit(len(self._causes.legs))
-        return shares
+        return np.asarray(self._sums.max(axis=0) / alarm_limit(len(self._causes.legs)))
 
     def _alarm(self, change: int) -> StepAlarm:
         """An alarm with the legs and the size by the runs from the change before it to the one after it."""

@@ -85,12 +85,10 @@ class VirtualCampaign:
     def _depart(self) -> bool:
         """Visit the pilot poses of one departure; whether there is any."""
         for taken in range(self.plan.pilots_per_departure):
-            pilot = self.plan.pilot_pose(self.state)
-            if pilot is None:
+            if (pilot := self.plan.pilot_pose(self.state)) is None:
                 return taken > 0
             self._go_to_pose(pilot)
-            record = self._take(pilot)
-            if record is not None:
+            if (record := self._take(pilot)) is not None:
                 self.state = replace(self.state, pilots=(*self.state.pilots, record))
         return True
 
@@ -109,8 +107,7 @@ class VirtualCampaign:
         """Go back to the reference of the present point."""
 
     def _measure(self, decision: decisions.StartPoint | decisions.MeasurePose) -> None:
-        record = self._take(decision)
-        if record is not None:
+        if (record := self._take(decision)) is not None:
             measurements = MeasurementSet((*self.measurements.records, record))
             self.state = replace(self.state, measurements=measurements, point=decision.point)
 

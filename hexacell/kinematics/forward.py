@@ -68,8 +68,7 @@ class ForwardResult:
 
 def assembly_mode(pose_jacobian: Array) -> Array:
     """Sign (n,) of the determinant of pose Jacobians (n, 6, 6); it changes only at a singularity."""
-    signs: Array = np.sign(np.linalg.det(pose_jacobian))
-    return signs
+    return np.asarray(np.sign(np.linalg.det(pose_jacobian)))
 
 
 def modes_of(mechanism: Mechanism, geometry: Geometries, poses: PoseBatch, joints: Array) -> Array:

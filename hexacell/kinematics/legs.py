@@ -61,8 +61,7 @@ class Legs:
         """Vectors (n, 6, 3) of the legs in those frames, from the base frame."""
         if self.carriers is None:
             return directions
-        seen: Array = np.einsum("nlij,nli->nlj", self.carriers, directions)
-        return seen
+        return np.asarray(np.einsum("nlij,nli->nlj", self.carriers, directions))
 
     @property
     def directions_in_platform(self) -> Array:
@@ -101,8 +100,7 @@ def segment_distances(start: Array, end: Array, other_start: Array, other_end: A
 
 def _product(one: Array, other: Array) -> Array:
     """Scalar products of vectors (3, ...)."""
-    product: Array = one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
-    return product
+    return np.asarray(one[0] * other[0] + one[1] * other[1] + one[2] * other[2])
 
 
 def _clipped(values: Array, least: float, most: float) -> Array:
@@ -116,8 +114,7 @@ def angles_between(vectors: Array, axes: Array) -> Array:
 
 
 def _dot(one: Array, other: Array) -> Array:
-    product: Array = np.einsum("...i,...i->...", one, other)
-    return product
+    return np.asarray(np.einsum("...i,...i->...", one, other))
 
 
 def by_pose(b: Array, n: Array) -> Array:

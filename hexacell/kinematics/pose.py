@@ -138,8 +138,7 @@ class PoseBatch(Batch):
         """Which of n poses are another one (1), up to rounding."""
         distance = np.abs(self.positions - other.positions).max(axis=-1)
         angle = np.abs(self.rotations - other.rotations).max(axis=(-2, -1))
-        same: Mask = (distance < SAME_MM) & (angle < SAME_ANGLE)
-        return same
+        return np.asarray((distance < SAME_MM) & (angle < SAME_ANGLE))
 
     def tilts(self) -> Array:
         """Angles (n,), rad, between the platform's z axis and the base's."""

@@ -137,8 +137,7 @@ class Limits:
         """Standard deviations (..., 3) of what gauges show, by a covariance in the convention."""
         base = self.frames.base
         variances = np.sum((covariance @ base) * base, axis=-2)
-        sigma: Array = np.sqrt(np.maximum(variances, 0.0))
-        return sigma
+        return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
 
     def zeroed_at(self, shown_mm: tuple[float, float, float] | None) -> Limits:
         """These limits once the gauges were zeroed where they show ``shown_mm`` along base x, y, z."""

@@ -145,8 +145,7 @@ class IdentificationResult(Frozen):
 
 def legs_at(temperatures_c: Temperatures) -> str:
     """The temperatures of legs in words: "legs at 20.0 to 21.5 deg C"; empty where none is known."""
-    known = [celsius for celsius in temperatures_c[:LEGS] if celsius is not None]
-    if not known:
+    if not (known := [celsius for celsius in temperatures_c[:LEGS] if celsius is not None]):
         return ""
     lowest, highest = (f"{limit(known):.1f}" for limit in (min, max))
     return f"legs at {lowest if lowest == highest else f'{lowest} to {highest}'} deg C"

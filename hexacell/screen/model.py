@@ -132,8 +132,7 @@ class ScreenModel:
                     "settings": (settings,),
                 }
             case "preflight":
-                checked = self._checked
-                if checked is None:
+                if (checked := self._checked) is None:
                     checked = live.checked_items(Mark.BUSY if self._is_checking else Mark.OPEN)
                 items = (*live.live_items(self._live()[0]), *checked)
                 return {

@@ -93,8 +93,7 @@ def fit_measurements(
         from hexacell.services.history.recorded_cell import commanding_geometries, noise_of_run  # noqa: PLC0415 - likewise
 
         robot = replace(robot, earlier=(*commanding_geometries(folder, cell.settings), *robot.earlier))
-        measured = noise_of_run(folder, cell.settings)
-        if measured is not None:
+        if (measured := noise_of_run(folder, cell.settings)) is not None:
             settings = with_measured_noise(settings, measured)
             robot = robot.with_errors_of(settings)
     known = known_parts(one.temperatures for one in measurements.records)

@@ -112,8 +112,7 @@ class OutputFile:
         return descriptor
 
     def _require_ours(self, data: bytes) -> None:
-        mark = self.kind.mark
-        if mark is None:
+        if (mark := self.kind.mark) is None:
             raise self._refusal("is there already")
         # An empty file is nobody's, but for locks.
         if (data or ".hexacell-" in self.path.name) and mark.search(data) is None:

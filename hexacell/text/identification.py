@@ -62,8 +62,7 @@ def _points_line(assessed: Assessment) -> str:
 
 def accuracy_table(assessed: Assessment) -> str:
     """Predicted errors at the task poses with the controller's geometry and with the identified one."""
-    accuracy = assessed.accuracy
-    if accuracy is None:
+    if (accuracy := assessed.accuracy) is None:
         return ""
     what = "task poses" if assessed.task_named else "poses across the workspace"
     title = f"Predicted error at {len(accuracy.poses)} {what}"

@@ -273,8 +273,7 @@ def common_sag(um: float, half_length_mm: float) -> Effect:
 
 def _across_rails(placement: Placement, shapes: Callable[[Array], Array]) -> Array:
     """Errors by displacements of some shapes (n, 6, m) along the rails, each rail and direction alone."""
-    guides = placement.guides
-    if guides is None:
+    if (guides := placement.guides) is None:
         return np.zeros((len(placement), 6, 0))
     on_rail = np.zeros((6, len(guides.rails)))
     for rail, legs in enumerate(guides.rails):

@@ -216,9 +216,7 @@ class ExcessTest:
         """Each part, and each leg, that expands evenly from the first record to the last."""
         placement = self.found.placement
         parameters, vector = placement.mechanism.parameters, placement.geometry.vector
-        parts = (
-            {kind.symbol: float(kind.part is part) for kind in parameters.kinds} for part in MachinePart
-        )
+        parts = ({one.symbol: float(one.part is part) for one in parameters.kinds} for part in MachinePart)
         changes = [parameters.by_kind(expands) * vector for expands in parts]
         progress = np.linspace(-0.5, 0.5, len(placement))[:, None, None]
         by_parts = placement.by_parameters(np.stack(changes, axis=-1))

@@ -250,8 +250,6 @@ def errors_by_scale(
     effect = common_encoder_scale(1.0)
     through = -pose_accuracy.error_jacobian(belief, task, workspace) @ parameter_columns[COMMON_SCALE]
     assert effect.on_poses is not None  # noqa: S101 - it moves the sliders
-    at_task, over = (
-        effect.on_poses(pose_accuracy.placement_of(belief, poses)) for poses in (task, workspace)
-    )
+    at_task, over = (effect.on_poses(pose_accuracy.placement_of(belief, at)) for at in (task, workspace))
     direct = pose_accuracy.teachable_frames(belief, workspace).remove_frame_motion(task, at_task, over)
     return np.asarray((through + direct)[..., 0])

@@ -78,8 +78,7 @@ class ErrorEstimate:
         they did to that one (:attr:`~hexacell.uncertainty.budget.UncertaintyBudget.parameter_columns`).
         """
         belief = estimate.belief
-        jacobian = task.jacobian(belief)
-        if jacobian is None:
+        if (jacobian := task.jacobian(belief)) is None:
             return None
         commanding = belief.mechanism.convention.free_parameters(belief.controller)
         acting, found = [effect for effect in effects if effect.size], estimate.identification

@@ -166,8 +166,7 @@ def _possible_causes(assessed: Assessment) -> str:
 
 
 def _accuracy(assessed: Assessment) -> str:
-    accuracy = assessed.accuracy
-    if accuracy is None:
+    if (accuracy := assessed.accuracy) is None:
         return "The robot can reach none of the task poses: no accuracy can be stated."
     where = "task poses" if assessed.task_named else "poses across the workspace"
     before, after = shown(accuracy.before.position_rms_mm), shown(accuracy.after.position_rms_mm)

@@ -75,16 +75,14 @@ def _noise(noise: NoiseLevels | None) -> dict[str, Any] | None:
 
 
 def _repeatability(assessed: Assessment) -> dict[str, Any] | None:
-    scatter = assessed.repeatability
-    if scatter is None:
+    if (scatter := assessed.repeatability) is None:
         return None
     more = {"distance_mm": scatter.distance_mm, "recalibrating_helps": not assessed.does_not_repeat}
     return asdict(scatter) | more
 
 
 def _accuracy(assessed: Assessment) -> dict[str, Any] | None:
-    accuracy = assessed.accuracy
-    if accuracy is None:
+    if (accuracy := assessed.accuracy) is None:
         return None
     return {
         "task_named": assessed.task_named,

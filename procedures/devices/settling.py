@@ -65,8 +65,7 @@ def trimmed_mean(readings: Array) -> Array:
     """
     count = len(readings)
     cut = max(1, count // TRIMMED) if count >= FEWEST_TO_TRIM else 0
-    mean: Array = np.sort(readings, axis=0)[cut : count - cut].mean(axis=0)
-    return mean
+    return np.asarray(np.sort(readings, axis=0)[cut : count - cut].mean(axis=0))
 
 
 async def read_all(devices: Devices, clock: CellClock) -> DeviceSnapshot:

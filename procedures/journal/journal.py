@@ -271,8 +271,7 @@ def _parse(path: Path, stream: BinaryIO, longest_line: int = LONGEST_LINE) -> tu
     with _collector_at_rest():
         while line := stream.readline(most()):
             due = len(entries) + 1
-            entry = decode(line, path, due)
-            if entry is None:
+            if (entry := decode(line, path, due)) is None:
                 parts = iter(lambda: stream.read(most()), b"")
                 if begins_whole(line) or any(part.strip(b"\0") for part in parts):
                     problem = "this line of the journal is damaged"
@@ -319,8 +318,7 @@ def decode(line: bytes, path: Path, due: int) -> Entry | None:
         return None
     if due == 1:
         _require_known_version(line, path)
-    match = _LINE.fullmatch(line[: -_TAIL_LENGTH - 1] + b"}")
-    if match is None:
+    if (match := _LINE.fullmatch(line[: -_TAIL_LENGTH - 1] + b"}")) is None:
         raise _foreign("it has an unknown form", path, due)
     number, at, monotonic, event = match.groups()
     if int(number) != due:

@@ -243,8 +243,7 @@ class ConfigEdits:
 
         Raises ``FileError``, with the first line that differs if this process has seen it before.
         """
-        expected = expected_fingerprints(self.folder, state)
-        if not expected:
+        if not (expected := expected_fingerprints(self.folder, state)):
             return
         found = read_contents(self.paths)
         if fingerprint_of(found) in expected:
@@ -257,9 +256,7 @@ class ConfigEdits:
         for path, old, new in zip(self.paths, self._unedited or (), found, strict=False):
             if old != new:
                 lines = zip_longest(old.split(b"\n"), new.split(b"\n"))
-                return path, next(
-                    (row for row, (one, two) in enumerate(lines, start=1) if one != two), None
-                )
+                return path, next((row for row, (one, two) in enumerate(lines, 1) if one != two), None)
         return self.paths[0], None
 
 

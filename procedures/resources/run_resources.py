@@ -148,8 +148,7 @@ class RunResources:
             now, mechanism = self.current_config.geometry(), self.calibration.robot.mechanism
             states = now.geometry, now.branch, now.corrections
             commands, _ = commanded_joints(mechanism, *states, PoseBatch.of([way[-1]]))
-            joints: Array = commands[0]
-            return joints
+            return np.asarray(commands[0])
 
         await self.guards.move(moves, watched, commanded)
 

@@ -69,16 +69,13 @@ class Revisit(StepOfSet):
         change = run.since_reference(state, self.at, reading)
         limit_mm, joint_limit = run.settings.reference_agreement
         if (leg := change.slipped_encoder()) is not None:
-            slipped = slip_in_words(change, leg, run.settings.mechanism.words.joint_unit)
-            reason = f"back at its reference {slipped}"
-            return SetInvalidated(at=self.at, reason=reason, reading=reading)
-        if change.exceeds(limit_mm):
+            shown = slip_in_words(change, leg, run.settings.mechanism.words.joint_unit)
+        elif change.exceeds(limit_mm):
             shown = f"the gauges show {in_words(change.unexplained_mm)} that the encoders do not explain"
-            reason = f"back at its reference {shown}, more than {limit_mm:g} mm"
-            return SetInvalidated(at=self.at, reason=reason, reading=reading)
-        if (leg := change.leg_beyond(joint_limit)) is not None:
-            shown = f"q{leg + 1} shows {change.joints[leg]:+.3f}"
-            reason = f"back at its reference {shown}, more than {joint_limit:g}"
-            return SetInvalidated(at=self.at, reason=reason, reading=reading)
-        change_mm = deviation_of(change.unexplained_mm)
-        return ReferenceConfirmed(at=self.at, change_mm=change_mm, reading=reading)
+            shown += f", more than {limit_mm:g} mm"
+        elif (leg := change.leg_beyond(joint_limit)) is not None:
+            shown = f"q{leg + 1} shows {change.joints[leg]:+.3f}, more than {joint_limit:g}"
+        else:
+            change_mm = deviation_of(change.unexplained_mm)
+            return ReferenceConfirmed(at=self.at, change_mm=change_mm, reading=reading)
+        return SetInvalidated(at=self.at, reason=f"back at its reference {shown}", reading=reading)

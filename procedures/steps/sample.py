@@ -108,8 +108,7 @@ async def read_inside(
         if not consists_only_of(error, GaugeAtEnd):
             raise
         return RecordRejected(at=step.at, orientation=step.orientation, reason=str(error))
-    zero = state.zero(step.at)
-    if zero is None:
+    if (zero := state.zero(step.at)) is None:
         allowed_mm = run.calibration.known(state).allowances.mounting_mm(Pose(*step.pose))
         require_room(run.settings, reading.gauges_mm, allowed_mm)
         zero = reading

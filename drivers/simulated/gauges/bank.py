@@ -62,9 +62,7 @@ class SimulatedGaugeBank(ServedGroup):
                 line = served.enter_context(self._serve(group))
                 self._lines |= {gauge.name: line for gauge in group}
             self._served = served.pop_all()
-        self.gauges = tuple(
-            gauge.model_copy(update={"port": self.line(gauge.name).address}) for gauge in gauges
-        )
+        self.gauges = tuple(one.model_copy(update={"port": self.line(one.name).address}) for one in gauges)
 
     def line(self, gauge: str) -> GaugeLineServer:
         return self._lines[gauge]

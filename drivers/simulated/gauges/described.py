@@ -106,8 +106,7 @@ class _Template:
     """The example of a frame, whose number and channel are others."""
 
     def __init__(self, described: DescribedFrame) -> None:
-        match = re.fullmatch(described.answer, described.bare_example)
-        if match is None:
+        if (match := re.fullmatch(described.answer, described.bare_example)) is None:
             raise ValueError(described.example)
         self._example, self._mm_per_unit = described.example, described.mm_per_unit
         self._number = match.span(described.number_group)

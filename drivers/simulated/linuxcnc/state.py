@@ -164,8 +164,7 @@ class ControllerState:
         self.modes = parsed.modes
         if (target := parsed.target) is None:
             return True
-        duration_s = parsed.duration_s
-        if duration_s is not None:
+        if (duration_s := parsed.duration_s) is not None:
             duration_s *= 100.0 / self.feed_override_percent
         job = self._start(lambda: self._travel(target, duration_s))
         if not self.waits:

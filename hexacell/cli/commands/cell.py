@@ -63,7 +63,6 @@ def cell_with_devices_at(path: Path, console: Console) -> Cell:
 
 def archive_url(url: str) -> str:
     """The address of an archive that cells share, if it is one; raises ``UsageError``."""
-    mistake = mistake_in_url(url)
-    if mistake is not None:
+    if (mistake := mistake_in_url(url)) is not None:
         raise UsageError(mistake[0], subject="--archive", action=mistake[1])
     return url

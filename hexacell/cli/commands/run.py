@@ -142,8 +142,7 @@ def _run_and_repeat(request: RunRequest, console: Console, stream: EventStream |
         request, console, lambda: execute_run(request, console, _copied(request, stream))
     )
     state = fold(read_journal(request.folder.journal))
-    again = unattended_runs.repetition(request, state)
-    if again is None:
+    if (again := unattended_runs.repetition(request, state)) is None:
         return RunEnd(request, ended, state)
     console.print(REPEATED)
     ended = execute_run(again, console, _copied(again, stream))

@@ -19,8 +19,7 @@ from hexacell.storage.output_files import SERVED_MARK
 def results(options: argparse.Namespace, console: Console) -> ExitCode:
     """Serve until interrupted; runs are only read."""
     cell = cell_at(options.cell, console)
-    settings = cell.settings.opcua
-    if settings is None:
+    if (settings := cell.settings.opcua) is None:
         raise UsageError("its results are not served", subject=cell.path, action="Write [opcua] into it")
     if not is_loopback(settings.host):
         console.warn(f"who reaches {settings.host}:{settings.port} with the password can read results")

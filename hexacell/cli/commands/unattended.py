@@ -64,8 +64,7 @@ def begun_in_window(
         except HexacellError as error:
             if request.folder.journal.is_file() or is_evidence_lost(error):
                 raise  # it had begun: its journal says the rest
-            wait_s = refused_start(request, error, began, local_now())
-            if wait_s is None:
+            if (wait_s := refused_start(request, error, began, local_now())) is None:
                 raise
             console.warn(f"{error}\nnot begun; tried again in {duration(wait_s / 60.0)}")
             SignalCommands(console).run(asyncio.sleep(wait_s))

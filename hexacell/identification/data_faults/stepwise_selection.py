@@ -133,8 +133,7 @@ def select_faults(problem: Problem, fit: Identification | None = None) -> Select
         readmitted = _readmitted(selected)
         return _only_proven(selected if readmitted is None else _forward(readmitted))
     except UncorrectableFaultError:
-        other = _other_minimum(problem)
-        if other is None:
+        if (other := _other_minimum(problem)) is None:
             raise
         return Selection(other, {})
 

@@ -252,8 +252,7 @@ class Identification:
     @cached_property
     def terms(self) -> TermEstimates | None:
         """What the records say of the terms beside the geometry; None where it has none."""
-        taken = self.problem.terms
-        if taken is None:
+        if (taken := self.problem.terms) is None:
             return None
         return TermEstimates.at(self.problem, taken, self.prediction, self.free_covariance)
 

@@ -105,7 +105,6 @@ class JointedLegs(Mechanism):
     def platform_radius(self, geometry: Geometries) -> Array:
         def compute() -> Array:
             joints = geometry[self.platform_joint]
-            radius: Array = np.sqrt(np.einsum("...i,...i->...", joints, joints)).mean(axis=-1)
-            return radius
+            return np.asarray(np.sqrt(np.einsum("...i,...i->...", joints, joints)).mean(axis=-1))
 
         return geometry.once("mean radius", compute)

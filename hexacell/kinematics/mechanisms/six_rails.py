@@ -82,8 +82,7 @@ class SixRails(JointedLegs):
         along = np.einsum("nij,ij->ni", v, _directions(geometry))
         squared = geometry["l"] ** 2 - np.einsum("nij,nij->ni", v, v) + along**2
         root = np.sqrt(np.where(squared >= 0.0, squared, np.nan))
-        joints: Array = np.asarray(branch) * root - along
-        return joints
+        return np.asarray(np.asarray(branch) * root - along)
 
     def branch(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
         _, v = self.leg_vectors(geometry, poses, joints)

@@ -72,8 +72,7 @@ def drift_history(cell: Cell, index: RunIndex | None = None) -> DriftHistory:
     Raises:
         FileError: the controller's config, or the folder of the runs, cannot be read.
     """
-    runs = _counted_runs(cell, index or RunIndex(cell))
-    if not runs:
+    if not (runs := _counted_runs(cell, index or RunIndex(cell))):
         return DriftHistory((), (), (), ())
     # Imported here: a cell without runs needs nothing of the watch.
     from hexacell.checks.change_alarm import machine_causes  # noqa: PLC0415

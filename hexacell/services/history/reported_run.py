@@ -94,8 +94,7 @@ def reported_run(run: Path) -> ReportedRun:
 
 
 def _document(path: Path) -> Mapping[str, Any]:
-    data = atomic_files.read_if_present(path)
-    if data is None:
+    if (data := atomic_files.read_if_present(path)) is None:
         return {}
     try:
         found = json.loads(data)

@@ -134,8 +134,7 @@ def _require_own_poses(cell: Cell, folder: RunFolder, state: RunState, started: 
 
     They were commanded with one of the geometries that the controller had during the run.
     """
-    poses = list(dict.fromkeys(_poses_to_come(state)))
-    if not poses:
+    if not (poses := list(dict.fromkeys(_poses_to_come(state)))):
         return
     robot = started_robot(cell.settings, started)
     batch = PoseBatch.of(Pose(*pose) for pose in poses)

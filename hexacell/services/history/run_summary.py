@@ -92,8 +92,7 @@ def result_of_its_own(state: RunState) -> IdentificationResult | None:
 
 def require_result(state: RunState, run: str) -> IdentificationResult:
     """What the records of a run alone identified; raises ``UsageError`` where there is no such result."""
-    result = result_of_its_own(state)
-    if result is None:
+    if (result := result_of_its_own(state)) is None:
         raise UsageError(
             f"the run {run} identified no geometry of its own", action="Name calibrations, which do"
         )
@@ -120,8 +119,7 @@ def evidence_document(settings: CellSettings, folder: RunFolder) -> EvidenceDocu
     """
     try:
         entries, state = read_sound(folder, settings)
-        counted = _counted(settings, state)
-        if counted is None:
+        if (counted := _counted(settings, state)) is None:
             return None
         calibration, free, false = counted
         samples = tuple(

@@ -181,8 +181,7 @@ def _attempt(address: NoticeAddress, notice: Notice, longest_s: float) -> None:
     worker.join(longest_s)
     if worker.is_alive():
         raise NoticeUndelivered(f"not taken within {longest_s:g} s")
-    problem = ended.get_nowait()
-    if problem is not None:
+    if (problem := ended.get_nowait()) is not None:
         raise NoticeUndelivered(problem)
 
 
@@ -337,10 +336,8 @@ def _attachment(notice: Notice) -> Any:  # noqa: ANN401 - as apprise's
     from apprise.attachment import memory  # noqa: PLC0415 - likewise
 
     attachment: Any = memory.AttachMemory  # which has no types
-    document = attachment(
-        notice.model_dump_json(indent=1), name="hexacell.json", mimetype="application/json"
-    )
-    return AppriseAttachment([document])
+    file = attachment(notice.model_dump_json(indent=1), name="hexacell.json", mimetype="application/json")
+    return AppriseAttachment([file])
 
 
 def _kind(notice: Notice) -> str:

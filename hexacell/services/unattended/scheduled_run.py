@@ -76,8 +76,7 @@ def time_of_day(text: str) -> tuple[int, int]:
     Raises:
         UsageError: it is no time of day.
     """
-    found = _TIME.fullmatch(text)
-    if found is None:
+    if (found := _TIME.fullmatch(text)) is None:
         raise UsageError(f"'{text}' is no time of day", action="Write it as 02:30")
     return int(found[1]), int(found[2])
 

@@ -122,8 +122,7 @@ def remove_schedule(cell: Cell, folder: Path | None) -> Schedule | None:
     Raises:
         FileError: they cannot be removed.
     """
-    present = present_schedule(cell, folder)
-    if present is not None:
+    if (present := present_schedule(cell, folder)) is not None:
         _remove_units(present.files)
     return present
 
@@ -198,8 +197,7 @@ def _owner_of(cell: Path) -> str:
 
 
 def _verified(units: Sequence[Path]) -> tuple[str, ...]:
-    program = shutil.which("systemd-analyze")
-    if program is None:
+    if (program := shutil.which("systemd-analyze")) is None:
         return ()
     try:
         done = subprocess.run(  # noqa: S603 - our own files

@@ -32,8 +32,7 @@ def refuse_quiet_hours(settings: CellSettings, at: datetime) -> None:
     Raises:
         OutOfTime: names their end.
     """
-    until = quiet_until(settings.unattended, at)
-    if until is not None:
+    if (until := quiet_until(settings.unattended, at)) is not None:
         raise OutOfTime(
             f"these are quiet hours of the cell, until {until:%H:%M}: no run begins without a person",
             action="Let it begin later, or change quiet_hours in [unattended]",
@@ -57,8 +56,7 @@ def note_unreadable_cell(path: Path, mode: str, error: HexacellError) -> None:
 
     Nothing is noted where the cell's name is unknown, or the disk takes no note.
     """
-    folder = run_folder.runs_folder_of_unreadable(path)
-    if folder is not None:
+    if (folder := run_folder.runs_folder_of_unreadable(path)) is not None:
         _note_refusal(run_folder.new_run_in(folder), mode, error, datetime.now(UTC))
 
 

@@ -77,8 +77,7 @@ def _changes(run: ReportedRun) -> Picture | None:
 
 def uncertainty_chapter(run: ReportedRun) -> Chapter | None:
     """The budget that U comes from; None without an identification."""
-    budget = run.document.get("uncertainty")
-    if not budget:
+    if not (budget := run.document.get("uncertainty")):
         return None
     unit = unit_of(budget["standard_mm"])
     rows = [("noise of the readings", "", unit.number(budget["noise_mm"]), "measured and stated")]

@@ -109,8 +109,7 @@ def method_sentences(run: ReportedRun) -> str:
 
 def _reasons(run: ReportedRun) -> Block:
     """The tests of the model, or the outcome of a check or a length check."""
-    judged = run.state.judged
-    if judged is None:
+    if (judged := run.state.judged) is None:
         reason = "it is not over" if run.state.ended is None else run.state.ended.line
         return Paragraph(f"How it ended: {reason}.")
     if judged.verification is not None and judged.verification.tests:

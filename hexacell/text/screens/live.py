@@ -124,8 +124,7 @@ def mounting_advice(gauge: GaugeSnapshot, mounting_mm: float) -> str:
     """What to do with a gauge that is being placed."""
     if gauge.problem or gauge.shown_mm is None:
         return f"the {gauge.name} gauge does not answer"
-    place = plunger_place(gauge)
-    if place is None:
+    if (place := plunger_place(gauge)) is None:
         return f"set the {gauge.name} plunger to mid travel by eye"
     if abs(place) <= mounting_mm:
         return f"ok, {abs(place):.1f} mm from mid travel"

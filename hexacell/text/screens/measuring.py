@@ -78,8 +78,7 @@ def _reason(picture: RunPicture) -> str:
 
 
 def _doing(picture: RunPicture) -> str:
-    step = picture.step
-    if step is None:
+    if (step := picture.step) is None:
         return "choosing the next pose"
     if isinstance(step, Move):
         name = step.at.name

@@ -89,8 +89,7 @@ def _comparison(state: RunState) -> tuple[str, ...]:
     rows = []
     for name, phase in (("before", Phase.BEFORE), ("after", Phase.AFTER)):
         deviations = state.held_out(phase)
-        found = DeviationStatistics.of(deviations)
-        if found is None:
+        if (found := DeviationStatistics.of(deviations)) is None:
             rows.append(f"{name:8}not measured yet")
             continue
         largest = float(np.linalg.norm(deviations, axis=-1).max())
@@ -103,9 +102,7 @@ def deviation_plot(state: RunState) -> PlotView:
     series = []
     for name, marker, phase in (("before", "o", Phase.BEFORE), ("after", "x", Phase.AFTER)):
         sizes = (max(float(np.linalg.norm(one)), 1e-4) for one in state.held_out(phase))
-        series.append(
-            Series(name, marker, tuple((float(n), size) for n, size in enumerate(sizes, start=1)))
-        )
+        series.append(Series(name, marker, tuple((float(n), size) for n, size in enumerate(sizes, 1))))
     return PlotView(
         title="Deviation per held-out pose, mm",
         x_label="held-out pose",

@@ -72,8 +72,7 @@ class RunPicture:
     @property
     def at(self) -> SetKey | None:
         """The set that is being measured."""
-        step_at = getattr(self.step, "at", None)
-        if step_at is not None:
+        if (step_at := getattr(self.step, "at", None)) is not None:
             return SetKey.model_validate(step_at)
         return self.state.at_pose[0] if self.state.at_pose else None
 
@@ -139,8 +138,7 @@ def header_line(cell: str, picture: RunPicture) -> tuple[str, str, Urgency]:
     activity = MODES[described.mode]
     if described.is_recorded:
         where = f"hexacell | {cell} | recorded {activity} {described.folder.name}"
-        cursor = picture.cursor
-        if cursor is None:
+        if (cursor := picture.cursor) is None:
             return where, "RECORDED", Urgency.CALM
         speed = f"x{cursor.speed:g}" if cursor.speed else "halted"
         state = f"{cursor.at:%Y-%m-%d %H:%M:%S} {cursor.sequence}/{cursor.last} {speed}"

@@ -181,10 +181,8 @@ class _Scale:
 
     def cell(self, value: float) -> int:
         """The cell of a value, from 0."""
-        low, high, place = (
-            log10(one) if self.is_logarithmic else one for one in (self.low, self.high, value)
-        )
-        share = (place - low) / (high - low)
+        low, high, at = (log10(one) if self.is_logarithmic else one for one in (self.low, self.high, value))
+        share = (at - low) / (high - low)
         return round(min(max(share, 0.0), 1.0) * (self.cells - 1))
 
 

@@ -14,8 +14,7 @@ def printable(text: str) -> str:
     """
     if text.isprintable():
         return text
-    lines = text.replace("\r\n", "\n").expandtabs(TAB_COLUMNS)
-    return "".join(map(_seen, lines))
+    return "".join(map(_seen, text.replace("\r\n", "\n").expandtabs(TAB_COLUMNS)))
 
 
 def _seen(sign: str) -> str:

@@ -128,8 +128,7 @@ class ModbusPort(RequestPort):
             )
             refused.is_absence = code in NOT_THERE
             raise refused
-        frame_bytes = FRAME_BYTES + REGISTER_BYTES * count
-        if len(answer.registers) != count or not self._is_alone(frame_bytes):
+        if len(answer.registers) != count or not self._is_alone(FRAME_BYTES + REGISTER_BYTES * count):
             self._must_clear = True  # one of several frames, of which nobody knows which is the answer
             raise NoAnswer(self._received, self._sent)
         return struct.pack(f">{count}H", *answer.registers)

@@ -86,8 +86,7 @@ class MechanismExample:
         limit = np.radians(self.tilt_deg)
         angles = np.concatenate([np.zeros((1, 3)), random.uniform(-limit, limit, (TRIES, 3))])
         poses = PoseBatch.at(np.asarray(point, dtype=float), rotations.from_angles(angles))
-        reached = np.isfinite(self.joints(self.drawing, poses)).all(axis=-1)
-        poses = poses[np.flatnonzero(reached)]
+        poses = poses[np.flatnonzero(np.isfinite(self.joints(self.drawing, poses)).all(axis=-1))]
         margins = singularity_margin(self.mechanism, self.drawing, poses, self.joints(self.drawing, poses))
         clear = np.flatnonzero(margins > LEAST_MARGIN)[:TURNS]
         assert len(clear) == TURNS, f"the drawing's robot reaches too few orientations at the point {point}"

@@ -68,8 +68,7 @@ class KinematicsTests:
             zeros = mechanism.encoder_zeros(geometry)
             for leg in range(6):
                 changed = Geometry(mechanism.parameters, geometry.vector + zeros[:, leg])
-                shown = joints - np.eye(6)[leg]
-                left = mechanism.residual_and_jacobian(changed, poses, shown)[0]
+                left = mechanism.residual_and_jacobian(changed, poses, joints - np.eye(6)[leg])[0]
                 words = f"encoder zero of leg {leg + 1}"
                 np.testing.assert_allclose(left, 0.0, atol=ROUNDING, err_msg=words)
 

@@ -51,8 +51,7 @@ def choose_terms(found: Identification) -> ChosenTerms:
     """
     problem = found.problem
     up, down = (problem.directions > 0.0).any(axis=0), (problem.directions < 0.0).any(axis=0)
-    by_direction = tuple(term for term in problem.offered if term.needs_directions)
-    left = () if (up & down).any() else by_direction
+    left = () if (up & down).any() else tuple(term for term in problem.offered if term.needs_directions)
     one_sided = left if (up | down).any() else ()
     findings = tuple(TermFinding(term.name, Finding.ONE_SIDE, 0.0) for term in one_sided)
     offered = tuple(term for term in problem.offered if term not in left)

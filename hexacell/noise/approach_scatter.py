@@ -213,5 +213,4 @@ class _Visits:
         sizes = (unit * np.exp(np.linspace(-bound, bound, STOP_SIZES))) ** 2
         variances = 1.0 + sizes[:, None] * np.maximum(shares, 0.0)
         log_dets = np.linalg.slogdet(covariance)[1] + np.log(variances).sum(axis=1)
-        chi_squares = (squares / variances).sum(axis=1)
-        return float(np.max(-0.5 * (self.freedom * log_dets + chi_squares)))
+        return float(np.max(-0.5 * (self.freedom * log_dets + (squares / variances).sum(axis=1))))

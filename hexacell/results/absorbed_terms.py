@@ -52,8 +52,7 @@ def absorbing(
     at_task, over = placement_of(belief, poses), placement_of(belief, task.workspace)
     coefficients = np.concatenate([left[term.name] for term in terms])
     errors = errors_by_terms(terms, frames, at_task, over) @ coefficients
-    radius = float(robot.mechanism.platform_radius(identified))
-    weights = np.repeat([1.0, radius], 3) / WANTED_MM
+    weights = np.repeat([1.0, float(robot.mechanism.platform_radius(identified))], 3) / WANTED_MM
     rows = (weights[:, None] * error_jacobian(belief, poses, task.workspace)).reshape(-1, len(belief.free))
     normal = rows.T @ rows + Prior.of(robot.mechanism, robot.drawing, robot.tolerances).precision
     # A controller with parameters larger by dp brings the robot -J dp beside where it would be.

@@ -124,9 +124,8 @@ class IdentificationResult(Frozen):
 
     def estimate(self, parameters: ParameterSet) -> result.GeometryEstimate:
         """What the acceptance gates need."""
-        covariance = np.array(self.covariance)
         return result.GeometryEstimate(
-            self.identified(parameters), covariance, self.termination, self.undetermined
+            self.identified(parameters), np.array(self.covariance), self.termination, self.undetermined
         )
 
     @property

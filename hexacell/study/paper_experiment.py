@@ -136,8 +136,7 @@ def _differences(
         poses = under.actual_poses(robot.frames.poses(commanded.commands)).poses
         positions = poses.positions + scatter_mm * random.standard_normal(poses.positions.shape)
         of_points = positions.reshape(-1, ORIENTATIONS, 3)
-        distances = np.linalg.norm(of_points - of_points[:, :1], axis=-1)[:, 1:]
-        return tuple(distances.ravel().tolist())
+        return tuple(np.linalg.norm(of_points - of_points[:, :1], axis=-1)[:, 1:].ravel().tolist())
 
     return Differences(places(robot.commanding), *map(places, found))
 

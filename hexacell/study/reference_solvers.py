@@ -20,8 +20,7 @@ from hexacell.kinematics.rotations import Array
 
 def pairs(problem: Problem) -> NDArray[np.intp]:
     """Rows (r, n) of every two records of one point (pairs, 2), r < n."""
-    ends = np.append(problem.first_rows[1:], problem.records)
-    spans = zip(problem.first_rows, ends, strict=True)
+    spans = zip(problem.first_rows, np.append(problem.first_rows[1:], problem.records), strict=True)
     found = [pair for first, end in spans for pair in itertools.combinations(range(first, end), 2)]
     return np.array(found, dtype=np.intp).reshape(-1, 2)
 

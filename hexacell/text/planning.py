@@ -74,8 +74,7 @@ def run_forecast_line(forecast: Forecast) -> str:
         expanded = forecast.expanded_mm(error_mm)
         return size if expanded is None else f"{size}, U {unit.number(expanded)}"
 
-    now = with_u(forecast.next_mm, unit.length(forecast.next_mm))
-    line = f"  predicted error at the task {now}"
+    line = f"  predicted error at the task {with_u(forecast.next_mm, unit.length(forecast.next_mm))}"
     left = forecast.records - 1
     if left < 1:
         return line

@@ -92,8 +92,7 @@ def stop_repeatability(
     mechanism's word for it.
     """
     occurrence = Occurrence.STOPS_AT_WORK if is_in_noise else Occurrence.EVERY_STOP
-    name = f"{REPEATABILITY} of a {joint}"
-    return Effect(name, size, unit.thousandth, occurrence, _by_stops)
+    return Effect(f"{REPEATABILITY} of a {joint}", size, unit.thousandth, occurrence, _by_stops)
 
 
 def command_repeatability(size: float, *, joint: str = "joint", unit: JointUnit = JointUnit.MM) -> Effect:

@@ -121,8 +121,7 @@ def drift_by_repeats(plan: Plan, state: RunState, allowances: Allowances) -> flo
         replace(allowances, robot=replace(allowances.robot, noise=replace(noise, walk_mm=0.0)))
         for noise in (allowances.robot.noise, plan.robot.noise)
     )
-    changes = tuple(repeated_readings(state, plan, measured))
-    if not Repeats(changes).show_drift(measured.robot.noise):
+    if not Repeats(tuple(repeated_readings(state, plan, measured))).show_drift(measured.robot.noise):
         return 0.0
     return Repeats(tuple(repeated_readings(state, plan, stated))).drift_mm
 

@@ -217,8 +217,7 @@ class Failed(BaseEvent):
     def applied_to(self, state: RunState) -> RunState:
         """A ball that left its plate on the way to a chosen pose is a rejected record."""
         where = (self.failure, place_of(self.step))
-        failures = {**state.failures, where: self.attempt}
-        counted = replace(state, failures=failures).without_position()
+        counted = replace(state, failures={**state.failures, where: self.attempt}).without_position()
         is_off_plate = self.failure is FailureKind.GAUGE_AT_END and self.action is not Action.REDO_SET
         match self.step:
             case Move(at=at, orientation=orientation) if is_off_plate and at.phase is Phase.IDENTIFY:

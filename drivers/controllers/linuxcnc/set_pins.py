@@ -149,8 +149,7 @@ def _require_no_other_way(text: HalText, hal: Sequence[Path], inis: Sequence[Ini
 
 
 def _shown(pattern: str) -> Mapping[str, str]:
-    lines = _halcmd(["-s", "show", "pin", pattern]).splitlines()
-    found = (_SHOWN.match(line) for line in lines)
+    found = (_SHOWN.match(line) for line in _halcmd(["-s", "show", "pin", pattern]).splitlines())
     return {one["pin"]: one["value"] for one in found if one is not None}
 
 

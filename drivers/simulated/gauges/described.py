@@ -79,8 +79,7 @@ class Scpi(Instrument):
 
     def _answer(self, command: bytes) -> bytes:
         asked = command.decode("latin-1")
-        indicator = self.indicators[self._values.get(asked, min(self.indicators))]
-        if not indicator.powered:
+        if not self.indicators[self._values.get(asked, min(self.indicators))].powered:
             return b""
         if asked in self._values:
             return self._value(self._values[asked])

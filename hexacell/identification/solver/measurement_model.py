@@ -172,8 +172,7 @@ class NuisanceElimination:
         self._station_covariance = np.linalg.inv(normal)
         self._sigmas, designs = np.zeros(0), list[Array]()
         if noise.gauge_scale > 0.0:
-            shown = problem.deviations @ problem.gauges
-            designs.append(-problem.gauges * shown[:, None, :])
+            designs.append(-problem.gauges * (problem.deviations @ problem.gauges)[:, None, :])
             self._sigmas = np.full(3, noise.gauge_scale)
         if noise.walk_mm > 0.0 and problem.records > problem.points:
             designs.append(walk_columns(problem.first_rows, problem.records, noise.walk_mm))
@@ -234,8 +233,7 @@ class NuisanceElimination:
         transposed = np.swapaxes(self._design, -1, -2)
         best = self._station_covariance @ self.problem.group_sums(transposed @ (self._weights @ values))
         reduced = values - self._design @ best[self._stations]
-        turned = best[:, 3:] / self.problem.noise.alignment
-        return reduced, turned.reshape(-1, values.shape[-1])
+        return reduced, (best[:, 3:] / self.problem.noise.alignment).reshape(-1, values.shape[-1])
 
     def _gram(self, values: Array, penalties: Array) -> Array:
         """Weighted products (m, j) of the common design with values that contain no c and w."""

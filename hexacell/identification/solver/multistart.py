@@ -26,8 +26,7 @@ BATCH_ROWS = 20_000
 
 def restarts(problem: Problem) -> Iterator[Problem]:
     """The problem with other start points, that of lowest cost first."""
-    starts = problem.initial_parameters + tolerance_draws(problem)
-    reached = list(_with_poses(problem, starts))
+    reached = list(_with_poses(problem, problem.initial_parameters + tolerance_draws(problem)))
     costs = np.full(len(reached), np.inf)  # next to a singularity
     for row, (free, poses) in enumerate(reached):
         prediction = predict(problem, free, poses)

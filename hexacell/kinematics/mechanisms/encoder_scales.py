@@ -52,11 +52,10 @@ class WithEncoderScales(Mechanism):
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
         exact = self.exact.derivatives(self.without_scales(geometry), poses, _actual(geometry, joints))
-        by_scale = (exact.joints * joints)[..., None]
         return ConstraintDerivatives(
             pose=exact.pose,
             joints=exact.joints * (1.0 + geometry["encoder_scale"]),
-            parameters=np.concatenate([exact.parameters, by_scale], axis=-1),
+            parameters=np.concatenate([exact.parameters, (exact.joints * joints)[..., None]], axis=-1),
         )
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:

@@ -97,8 +97,7 @@ def traceability_chapter(run: ReportedRun) -> Chapter:
             due = f"{stated.due or ''}{': EXPIRED' if stated.has_expired(day) else ''}"
         rows.append((one.device.name, one.device.description, one.serial_number or NOT_STATED, number, due))
     expired = ", ".join(run.settings.expired_on(day))
-    text = f"Expired on the day of the run: {expired}."
-    note = (Paragraph(text, is_strong=True),) if expired else ()
+    note = (Paragraph(f"Expired on the day of the run: {expired}.", is_strong=True),) if expired else ()
     table = Table(("Instrument", "kind", "serial number", "certificate", "due"), tuple(rows), None)
     return Chapter("Instruments and traceability", (table, *note))
 

@@ -142,15 +142,19 @@ class Legs:
         found = root(self.errors, near, args=(joints,), method="hybr", tol=1e-14)
         return found.x if np.abs(found.fun).max() < 1e-10 else None
 
-    def margin(self, joints: Array, pose: Array) -> float:
-        """Smallest singular value of the Jacobian by differences, rotations in mean radii."""
-        radius = np.linalg.norm(self.geometry["B"], axis=1).mean()
+    def jacobian(self, joints: Array, pose: Array, radius: float = 1.0) -> Array:
+        """Of the legs' errors (6, 6) by differences, rotations in mm at a radius."""
         columns = []
         for step in 1e-4 * np.eye(6):
             turned = Rotation.from_rotvec(step[3:] / radius) * Rotation.from_rotvec(pose[3:])
             moved = np.concatenate([pose[:3] + step[:3], turned.as_rotvec()])
             columns.append((self.errors(moved, joints) - self.errors(pose, joints)) / 1e-4)
-        return float(np.linalg.svd(np.array(columns), compute_uv=False)[-1])
+        return np.transpose(columns)
+
+    def margin(self, joints: Array, pose: Array) -> float:
+        """Smallest singular value of the Jacobian, rotations in mean radii."""
+        jacobian = self.jacobian(joints, pose, np.linalg.norm(self.geometry["B"], axis=1).mean())
+        return float(np.linalg.svd(jacobian, compute_uv=False)[-1])
 
 
 def turn(vector: Array) -> Array:
@@ -173,23 +177,23 @@ def vector(pose: Pose) -> Array:
     return np.concatenate([[pose.x, pose.y, pose.z], orientation.as_rotvec()])
 
 
-def reached(true: Geometry, commanding: Geometry, pose: Pose) -> tuple[Array, Array] | None:
-    """Sliders (6,) and true pose (6,) after a command; none if it leads through a singularity.
+def reached(true: Geometry, commanding: Geometry, pose: Pose) -> tuple[Array, Array]:
+    """Sliders (6,) and true pose (6,) after a command; not a number if it leads through a singularity.
 
     The machine is bent from the commanding geometry to the true one in small stages, so that it
     stays on its assembly mode.
     """
-    here: Array | None = vector(pose)
-    assert here is not None
-    joints = Legs(commanding).joints(here)
+    here = vector(pose)
+    joints, nowhere = Legs(commanding).joints(here), np.full(6, np.nan)
     if np.isnan(joints).any():
-        return None
+        return joints, nowhere
     for stage in range(1, STAGES + 1):
         share = stage / STAGES
         bent = Legs(Geometry(HEXAGLIDE_PARAMETERS, (1.0 - share) * commanding.vector + share * true.vector))
-        here = bent.closed(joints, here)
-        if here is None:
-            return None
+        closed = bent.closed(joints, here)
+        if closed is None:
+            return joints, nowhere
+        here = closed
     return joints, here
 
 
@@ -245,12 +249,9 @@ def _one_visit(
 ) -> tuple[Pose, Array, Array]:
     while True:
         pose = Pose(*point.tolist(), *random.uniform(-degrees, degrees, 3).tolist())
-        end = reached(true, commanding, pose)
-        if end is None:
-            continue
-        joints, here = end
-        far = np.abs(here[:3] - point).max() > FARTHEST_MM
-        if not far and Legs(true).margin(joints, here) >= SMALLEST_MARGIN:
+        joints, here = reached(true, commanding, pose)
+        is_near = np.abs(here[:3] - point).max() <= FARTHEST_MM
+        if is_near and Legs(true).margin(joints, here) >= SMALLEST_MARGIN:
             return pose, joints, here
 
 
@@ -300,16 +301,6 @@ def hexaglide() -> Hexaglide:
 def legs() -> type[Legs]:
     """Kinematics that owe nothing to the code under test."""
     return Legs
-
-
-@pytest.fixture(scope="session")
-def vector_of() -> Callable[[Pose], Array]:
-    return vector
-
-
-@pytest.fixture(scope="session")
-def reach() -> Callable[[Geometry, Geometry, Pose], tuple[Array, Array] | None]:
-    return reached
 
 
 @pytest.fixture(scope="session")

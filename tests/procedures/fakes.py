@@ -196,13 +196,13 @@ class FakeController(Fake):
 class Approver:
     """A person who puts gauges where they belong and answers as told."""
 
-    def __init__(self, name: str | None = "a tester") -> None:
+    def __init__(self, name: str | None = "a tester", startup: Sequence[str] = ()) -> None:
         self.name = name
         self.placed: list[int] = []
         self.asked: list[tuple[Sequence[AcceptanceGate], str]] = []
         self.problems: list[str] = []
         self.decisions: list[Action] = []
-        self.startup: list[str] = []
+        self.startup = list(startup)
         self.verifications: list[Verification] = []
 
     async def ask(self, question: questions.Question) -> str | None:

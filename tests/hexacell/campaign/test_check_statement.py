@@ -76,6 +76,7 @@ def test_the_forecast_is_the_first_number_with_which_the_interval_is_inside_for_
         records_to_decide(at_one_pose(), one, LIMITS, 20.0 * np.eye(3))
         for one in (at_one_pose(), at_one_pose(sigma=1.0))
     )
+    assert found is not None
     assert found == pytest.approx(np.ceil(needed), abs=1)
     assert found is not None
     assert guarded is not None

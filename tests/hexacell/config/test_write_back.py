@@ -2,6 +2,7 @@
 
 import math
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -54,16 +55,24 @@ def test_a_deleted_config_is_not_brought_back(config: Path, run: Path, proposal:
     assert not config.exists()
 
 
-def test_a_config_that_does_not_read_back_is_restored(config, run, proposal, monkeypatch) -> None:
-    """A disk that garbles the config: the backup is restored, and the garbled file is kept."""
-    replace = os.replace
+@pytest.fixture
+def garbles(monkeypatch: pytest.MonkeyPatch) -> Callable[[Path, bytes], None]:
+    """A disk that garbles a file once some content is in it."""
 
-    def garble(source: Path, target: Path) -> None:
-        replace(source, target)
-        if Path(target) == config and config.read_bytes() == proposal.text_after.encode():
-            config.write_bytes(b"garbled")
+    def garble(path: Path, content: bytes) -> None:
+        def replace(source: Path, target: Path, real: Callable[[Path, Path], None] = os.replace) -> None:
+            real(source, target)
+            if Path(target) == path and path.read_bytes() == content:
+                path.write_bytes(b"garbled")
 
-    monkeypatch.setattr(os, "replace", garble)
+        monkeypatch.setattr(os, "replace", replace)
+
+    return garble
+
+
+def test_a_config_that_does_not_read_back_is_restored(config, run, proposal, garbles) -> None:
+    """From the backup; the garbled file is kept."""
+    garbles(config, proposal.text_after.encode())
     with pytest.raises(WriteBackUndone, match="does not contain what was written") as caught:
         commit(proposal, run)
     assert caught.value.exit_code == 6
@@ -85,15 +94,8 @@ def test_an_interrupt_after_the_replacement_is_undone_and_stays_an_interrupt(
     assert config.read_bytes() == proposal.text_before.encode()
 
 
-def test_a_backup_that_does_not_read_back_stops_the_commit(config, run, proposal, monkeypatch) -> None:
-    replace = os.replace
-
-    def garble(source: Path, target: Path) -> None:
-        replace(source, target)
-        if Path(target).name == "config-before":
-            Path(target).write_bytes(b"garbled")
-
-    monkeypatch.setattr(os, "replace", garble)
+def test_a_backup_that_does_not_read_back_stops_the_commit(config, run, proposal, garbles) -> None:
+    garbles(run / "config-before", proposal.text_before.encode())
     with pytest.raises(FileError, match="backup is damaged"):
         commit(proposal, run)
     assert config.read_bytes() == proposal.text_before.encode()

@@ -22,6 +22,7 @@ from hexacell.design.criteria import D_OPTIMAL, Criterion, covariance_update
 from hexacell.design.predicted_records import SAFETY_SIGMAS, TRAVEL_SHARE, gauge_zero_at, predict_records
 from hexacell.design.travel_monte_carlo import TravelConstraint
 from hexacell.kinematics.pose import FrameTransform, Pose, PoseBatch
+from tests.hexacell.conftest import vector
 
 TILT = float(np.radians(45.0))
 
@@ -60,19 +61,19 @@ def test_candidates_are_poses_of_the_estimated_robot(found, much, legs):
         assert np.abs(estimated.errors(target, joints)).max() < 1e-9
 
 
-def test_inverse_kinematics_of_the_commands_gives_the_joints(found, paper, legs, vector_of):
+def test_inverse_kinematics_of_the_commands_gives_the_joints(found, paper, legs):
     targets, commands = found
     controller = legs(paper.nominal)
     for row, joints in enumerate(targets.joints):
-        command = vector_of(commands.pose(row))  # as it is sent: six numbers
+        command = vector(commands.pose(row))  # as it is sent: six numbers
         np.testing.assert_allclose(controller.joints(command), joints, atol=1e-6)
 
 
 def test_candidates_keep_the_singularity_margin_of_both_geometries(found, much, paper, legs):
     targets, commands = found
     for poses, geometry in ((targets.poses, much.geometry), (commands, paper.nominal)):
-        for vector, joints in zip(as_vectors(poses), targets.joints, strict=True):
-            assert legs(geometry).margin(joints, vector) > 0.05 - 1e-4
+        for pose, joints in zip(as_vectors(poses), targets.joints, strict=True):
+            assert legs(geometry).margin(joints, pose) > 0.05 - 1e-4
 
 
 def test_some_poses_of_the_estimated_robot_have_no_command(know, much):

@@ -8,6 +8,7 @@ import pytest
 from hexacell.design.decorrelation import decorrelating_poses
 from hexacell.identification.estimator import identify
 from hexacell.measurements.records import MeasurementSet, Record
+from tests.hexacell.conftest import reached
 
 SEED = 2
 DEGREES = 30.0
@@ -39,7 +40,7 @@ def correlation_of(found, pair):
 
 
 def test_the_record_changes_the_correlation_as_predicted(
-    found, belief, measured, visit, reach, paper, make_problem
+    found, belief, measured, visit, paper, make_problem
 ):
     pairs = found.strongly_correlated()[:6]
     tried = [
@@ -50,7 +51,7 @@ def test_the_record_changes_the_correlation_as_predicted(
     assert len(tried) >= 2
     exact = visit(seed=SEED, degrees=DEGREES)
     for pair, part in tried:
-        joints, pose = reach(paper.actual, paper.nominal, part.command)
+        joints, pose = reached(paper.actual, paper.nominal, part.command)
         reference = exact.balls[exact.labels.index((part.point, 1))]
         record = Record(part.point, 99, part.command, tuple(joints), tuple(pose[:3] - reference))
         more = identify(make_problem(MeasurementSet((*measured.records, record))))
@@ -59,11 +60,11 @@ def test_the_record_changes_the_correlation_as_predicted(
         assert 1.0 - abs(correlation_of(more, pair)) > 1.05 * (1.0 - abs(pair.correlation))
 
 
-def test_the_ball_stays_within_the_travel(found, belief, visit, reach, paper):
+def test_the_ball_stays_within_the_travel(found, belief, visit, paper):
     exact = visit(seed=SEED, degrees=DEGREES)
     pairs = found.strongly_correlated()[:6]
     for part in filter(None, decorrelating_poses(belief, found, pairs)):
-        _, pose = reach(paper.actual, paper.nominal, part.command)
+        _, pose = reached(paper.actual, paper.nominal, part.command)
         reference = exact.balls[exact.labels.index((part.point, 1))]
         assert np.abs(pose[:3] - reference).max() < 1.0
 

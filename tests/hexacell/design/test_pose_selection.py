@@ -20,11 +20,10 @@ from hexacell.design.predicted_records import (
 )
 from hexacell.errors import ExitCode, LimitError
 from hexacell.identification.estimator import estimate_online
-from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.motion.paths import PathPlanner
+from tests.hexacell.conftest import reached, vector
 
 TRAVEL_MM = 5.0
 TILT = float(np.radians(45.0))
@@ -57,7 +56,7 @@ def stands(legs, geometry, joints, near):
 
 
 def aimed_at(legs, estimate, choice, at):
-    start = np.concatenate([at.reference, Rotation.from_matrix(choice.command.rotation).as_rotvec()])
+    start = vector(Pose.of(at.reference, choice.command.rotation))
     return stands(legs, estimate.geometry, choice.record.targets.joints[0], start)
 
 
@@ -84,19 +83,13 @@ def test_the_ball_of_every_likely_robot_stays_inside_the_travel(stage, legs, hex
     random = np.random.default_rng(0)
     robots = random.multivariate_normal(estimate.free, estimate.free_covariance, size=120)
     problem = estimate.problem
-    reference_row = 0
-    assert problem.labels[reference_row].tolist() == [1, 1]
-    from_where = np.concatenate(
-        [
-            estimate.poses.positions[reference_row],
-            Rotation.from_matrix(estimate.poses.rotations[reference_row]).as_rotvec(),
-        ]
-    )
+    assert problem.labels[0].tolist() == [1, 1]
+    from_where = vector(estimate.poses.pose(0))
     goes_to = aimed_at(legs, estimate, choice, at)
     deviations = []
     for free in robots:
-        robot = Geometry(HEXAGLIDE_PARAMETERS, hexaglide.convention.basis @ free)
-        reference = stands(legs, robot, problem.joints[reference_row], from_where)
+        robot = hexaglide.convention.geometry(free)
+        reference = stands(legs, robot, problem.joints[0], from_where)
         deviations.append(stands(legs, robot, choice.record.targets.joints[0], goes_to)[:3] - reference[:3])
     spread = np.std(deviations, axis=0)
     assert (np.abs(deviations) < TRAVEL_MM).all()
@@ -104,12 +97,10 @@ def test_the_ball_of_every_likely_robot_stays_inside_the_travel(stage, legs, hex
     assert (spread < 1.5 * choice.record.sigma[0] + 0.02).all()
 
 
-def test_the_gain_is_the_reduction_of_entropy_by_the_record(
-    stage, know, paper, reach, make_problem, noisy, visit
-):
+def test_the_gain_is_the_reduction_of_entropy_by_the_record(stage, know, paper, make_problem, noisy, visit):
     """The entropy of the estimate with the record is lower by about the predicted gain."""
     estimate, _, choice = stage
-    joints, pose = reach(paper.actual, paper.nominal, choice.command)
+    joints, pose = reached(paper.actual, paper.nominal, choice.command)
     few = visit(points=1, orientations=4, degrees=2.0, seed=5)
     many = visit(seed=2)
     exact, measured = (few, few.measured(0.01, 5)) if estimate.records == 4 else (many, noisy)
@@ -138,19 +129,16 @@ def test_a_record_like_one_that_is_planned_is_not_selected(know, much):
 
 
 @pytest.mark.parametrize("present", [0, 2])
-def test_the_path_from_the_present_pose_is_clear_and_inside_the_travel(
-    know, much, paper, legs, vector_of, present
-):
+def test_the_path_from_the_present_pose_is_clear_and_inside_the_travel(know, much, paper, legs, present):
     """From a pose of the first point, over the waypoints, sampled more finely than in the selection."""
     at = station_of(know, much, 1)
     start = much.problem.commands.poses[[present]]
     choice = selected(know(much), at, TURNS, start)
     line = [np.array(pose.as_tuple()) for pose in (start.pose(0), *choice.waypoints, choice.command)]
-    real = much.poses[[present]]
-    near = np.concatenate([real.positions[0], Rotation.from_matrix(real.rotations[0]).as_rotvec()])
+    near = vector(much.poses.pose(present))
     for begin, end in pairwise(line):
         for share in np.linspace(0.0, 1.0, 40):
-            command = vector_of(Pose(*((1.0 - share) * begin + share * end).tolist()))
+            command = vector(Pose(*((1.0 - share) * begin + share * end).tolist()))
             joints = legs(paper.nominal).joints(command)
             near = stands(legs, much.geometry, joints, near)
             assert np.abs(joints).max() <= 800.0
@@ -190,12 +178,8 @@ def test_the_jacobian_of_the_record_is_that_of_the_forward_kinematics(stage, leg
     goes_to = aimed_at(legs, estimate, choice, at)
 
     def ball(free):
-        return stands(
-            legs,
-            Geometry(HEXAGLIDE_PARAMETERS, hexaglide.convention.basis @ free),
-            choice.record.targets.joints[0],
-            goes_to,
-        )[:3]
+        geometry = hexaglide.convention.geometry(free)
+        return stands(legs, geometry, choice.record.targets.joints[0], goes_to)[:3]
 
     steps = 1e-3 * np.eye(len(estimate.free))
     moved = [(ball(estimate.free + step) - ball(estimate.free - step)) / 2e-3 for step in steps]
@@ -239,7 +223,7 @@ def test_the_jacobian_of_the_zero_is_that_of_the_forward_kinematics(know, paper,
     deviations = exact.measured().deviations[rows]
 
     def at(free):
-        geometry = Geometry(HEXAGLIDE_PARAMETERS, hexaglide.convention.basis @ free)
+        geometry = hexaglide.convention.geometry(free)
         near = np.hstack([exact.balls[rows], Rotation.from_matrix(exact.rotations[rows]).as_rotvec()])
         found = np.array(
             [stands(legs, geometry, q, pose) for q, pose in zip(exact.joints[rows], near, strict=True)]

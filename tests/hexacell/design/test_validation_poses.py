@@ -13,6 +13,7 @@ from hexacell.errors import LimitError
 from hexacell.kinematics.pose import FrameTransform, Pose, PoseBatch
 from hexacell.motion.path_check import is_clear
 from tests.geometries import hexaglide_geometry
+from tests.hexacell.conftest import reached
 
 TRAVEL_MM = 5.0
 COUNT = 6
@@ -36,13 +37,9 @@ def test_the_first_pose_is_untilted_and_all_are_at_the_point(chosen, point):
     np.testing.assert_array_equal(chosen.positions, np.broadcast_to(point, (COUNT, 3)))
 
 
-def test_the_uncorrected_robot_keeps_the_ball_inside_the_travel(chosen, paper, reach):
+def test_the_uncorrected_robot_keeps_the_ball_inside_the_travel(chosen, paper):
     """The true robot under its uncalibrated controller: what the gauges will show."""
-    balls = []
-    for row in range(COUNT):
-        end = reach(paper.actual, paper.nominal, chosen.pose(row))
-        assert end is not None
-        balls.append(end[1][:3])
+    balls = [reached(paper.actual, paper.nominal, chosen.pose(row))[1][:3] for row in range(COUNT)]
     deviations = np.array(balls) - balls[0]
     assert np.abs(deviations).max() < TRAVEL_MM
     assert np.abs(deviations).max() > 0.5  # and it has something to judge
@@ -56,14 +53,14 @@ def test_validation_poses_differ_from_each_other(chosen):
     assert np.degrees(max(apart)) > 10.0
 
 
-def test_validation_poses_differ_from_the_orientations_used(chosen, know, much, point, paper, reach):
+def test_validation_poses_differ_from_the_orientations_used(chosen, know, much, point, paper):
     """The actual orientations at which the geometry was identified."""
     used = much.poses.rotations
     away = select_validation_poses(know(much), point, COUNT, TURNS, used)
     np.testing.assert_array_equal(away.rotations[0], np.eye(3))
 
     def nearest(poses):
-        stands = [reach(paper.actual, paper.nominal, poses.pose(row))[1][3:] for row in range(1, COUNT)]
+        stands = [reached(paper.actual, paper.nominal, poses.pose(row))[1][3:] for row in range(1, COUNT)]
         turns = Rotation.from_rotvec(np.array(stands))
         return min((turn * Rotation.from_matrix(used).inv()).magnitude().min() for turn in turns)
 
@@ -92,13 +89,9 @@ def test_a_pose_beyond_a_singularity_is_not_selected_though_it_is_farthest(know,
     centre = np.array([0.0, 0.0, 550.0])
     turns = PoseBatch.of([Pose(0, 0, 0, tilt) for tilt in (5.0, 10.0, 20.0, 35.0, 51.0, -75.0)]).rotations
     taken = select_validation_poses(exactly, centre, 5, turns)
-    np.testing.assert_allclose(sorted(pose_tilts(taken)), [0.0, 5.0, 10.0, 20.0, 35.0], atol=1e-9)
+    np.testing.assert_allclose(sorted(taken.numbers()[:, 3]), [0.0, 5.0, 10.0, 20.0, 35.0], atol=1e-9)
     with pytest.raises(LimitError, match="only 5 orientations"):
         select_validation_poses(exactly, centre, 6, turns)
-
-
-def pose_tilts(poses):
-    return [poses.pose(row).a for row in range(len(poses))]
 
 
 def test_a_point_out_of_reach_is_refused_and_named(know, much):

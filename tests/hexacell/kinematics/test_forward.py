@@ -11,6 +11,7 @@ from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.sensitivity import singularity_margin
+from tests.hexacell.conftest import vector
 from tests.hexacell.kinematics.numeric import MARGIN, POSES, numeric_jacobian, turned_about
 
 SMALL = st.floats(-1.0, 1.0)
@@ -25,10 +26,10 @@ def nudged(pose: Pose, by) -> PoseBatch:
 
 
 @given(POSES, NUDGES)
-def test_forward_undoes_inverse(hexaglide, paper, legs, vector_of, pose, by):
-    joints = legs(paper.actual).joints(vector_of(pose))
+def test_forward_undoes_inverse(hexaglide, paper, legs, pose, by):
+    joints = legs(paper.actual).joints(vector(pose))
     assume(not np.isnan(joints).any())
-    assume(legs(paper.actual).margin(joints, vector_of(pose)) > MARGIN)
+    assume(legs(paper.actual).margin(joints, vector(pose)) > MARGIN)
     found = forward_kinematics(hexaglide, paper.actual, joints[None], nudged(pose, by))
     assert found.found[0]
     np.testing.assert_allclose(found.poses.positions[0], pose.position, atol=1e-8)

@@ -23,6 +23,7 @@ from hexacell.kinematics.sensitivity import (
     singularity_margin,
 )
 from hexacell.robot.model import robot_of
+from tests.hexacell.conftest import vector
 from tests.hexacell.kinematics.numeric import POSES
 
 points = arrays(float, (4, 3), elements=st.floats(-100, 100, width=32))
@@ -94,8 +95,8 @@ def pose_difference(legs, joints, steps, near):
 
 
 @pytest.mark.parametrize("pose", [Pose(10, 20, 560, 5, -4, 3), Pose(-60, -120, 480, 20, 15, -25)])
-def test_sensitivity_agrees_with_finite_differences(hexaglide, paper, legs, vector_of, pose):
-    geometry, near, step = paper.actual, vector_of(pose), 1e-3
+def test_sensitivity_agrees_with_finite_differences(hexaglide, paper, legs, pose):
+    geometry, near, step = paper.actual, vector(pose), 1e-3
     joints = legs(geometry).joints(near)
     found = pose_sensitivity(hexaglide, geometry, PoseBatch.of([pose]), joints[None])
     for n in range(6):
@@ -115,13 +116,11 @@ def test_sensitivity_agrees_with_finite_differences(hexaglide, paper, legs, vect
 
 
 @given(POSES)
-def test_margin_is_the_smallest_singular_value_of_the_scaled_jacobian(
-    hexaglide, paper, legs, vector_of, pose
-):
-    joints = legs(paper.actual).joints(vector_of(pose))
+def test_margin_is_the_smallest_singular_value_of_the_scaled_jacobian(hexaglide, paper, legs, pose):
+    joints = legs(paper.actual).joints(vector(pose))
     assume(not np.isnan(joints).any())
     margin = singularity_margin(hexaglide, paper.actual, PoseBatch.of([pose]), joints[None])
-    assert margin[0] == pytest.approx(legs(paper.actual).margin(joints, vector_of(pose)), abs=1e-5)
+    assert margin[0] == pytest.approx(legs(paper.actual).margin(joints, vector(pose)), abs=1e-5)
 
 
 def test_margin_does_not_depend_on_the_size_of_the_machine(hexaglide, paper, inverse):

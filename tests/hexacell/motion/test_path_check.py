@@ -12,7 +12,7 @@ from hexacell.limits.leg_limits import LegLimits
 from hexacell.limits.limits import AxisLimits
 from hexacell.motion.path_check import LinesFrom, is_clear
 from hexacell.motion.trajectory import PIECES, interpolate_line
-from tests.hexacell.conftest import NOMINAL
+from tests.hexacell.conftest import NOMINAL, vector
 from tests.hexacell.design.conftest import LIMITS, known
 
 
@@ -71,12 +71,12 @@ def test_a_line_is_clear_in_both_directions_or_in_none():
             assert is_clear(exactly(), start, end) == is_clear(exactly(), end, start)
 
 
-def test_a_line_through_a_singularity_is_refused_though_both_ends_are_clear(legs, paper, vector_of):
+def test_a_line_through_a_singularity_is_refused_though_both_ends_are_clear(legs, paper):
     """The platform is singular at about 46 deg of A, and has margin again on the other side."""
     low, high = Pose(0, 0, 550, 30), Pose(0, 0, 550, 51)
     for pose in (low, high):
-        vector = vector_of(pose)
-        assert legs(paper.nominal).margin(legs(paper.nominal).joints(vector), vector) > 0.02
+        here = vector(pose)
+        assert legs(paper.nominal).margin(legs(paper.nominal).joints(here), here) > 0.02
     limited = exactly(singularity_margin=0.02)
     assert not is_clear(limited, at(*low.as_tuple()), at(*high.as_tuple()))
     assert is_clear(limited, at(*low.as_tuple()), at(0, 0, 550, 41))

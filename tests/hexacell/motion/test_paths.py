@@ -140,38 +140,26 @@ def plan(monkeypatch: pytest.MonkeyPatch) -> Any:
     return planned
 
 
-def move(trail: list[Pose], departure: int) -> int | Pose:
+OFF = Pose(0, 0, 500, 20)
+
+
+@pytest.mark.parametrize(
+    ("stops", "clear_to", "here", "back"),
+    [
+        ([], (), [], 0),  # straight to the reference where that is safe
+        ([WAYPOINT], (), [], WAYPOINT),
+        ([WAYPOINT], (), [WAYPOINT], 0),
+        (None, (5, 10), [], 1),  # without a path to the earliest pose that is clear
+        (None, (), [], 2),  # without any clear line back along the trail
+        ([WAYPOINT], (0,), [OFF], 0),
+        ([WAYPOINT], (), [OFF], 3),  # off the planned path along the trail
+    ],
+)
+def test_the_way_back_is_planned_from_the_last_pose_that_was_measured(plan, stops, clear_to, here, back):
+    asked = plan(*(stops or ()), found=stops is not None, clear_to=clear_to)
     nothing: Any = None
-    return next_return_move(nothing, np.zeros(3), PoseBatch.of(trail), departure)
-
-
-def test_straight_to_the_reference_where_that_is_safe(plan: Any) -> None:
-    plan()
-    assert move(TRAIL, 3) == 0
-
-
-def test_over_the_waypoints_of_the_path_and_then_to_the_reference(plan: Any) -> None:
-    asked = plan(WAYPOINT)
-    assert move(TRAIL, 3) == WAYPOINT
-    assert move([*TRAIL, WAYPOINT], 3) == 0
-    assert asked == pytest.approx([15.0, 15.0]), "planned from the last pose that was measured"
-
-
-def test_without_a_path_to_the_earliest_pose_that_is_clear(plan: Any) -> None:
-    plan(found=False, clear_to=(5, 10))
-    assert move(TRAIL, 3) == 1
-
-
-def test_without_any_clear_line_back_along_the_trail(plan: Any) -> None:
-    plan(found=False)
-    assert move(TRAIL, 3) == 2
-
-
-def test_off_the_planned_path_the_robot_returns_along_the_trail(plan: Any) -> None:
-    plan(WAYPOINT, clear_to=(0,))
-    assert move([*TRAIL, Pose(0, 0, 500, 20)], 3) == 0
-    plan(WAYPOINT)
-    assert move([*TRAIL, Pose(0, 0, 500, 20)], 3) == 3
+    assert next_return_move(nothing, np.zeros(3), PoseBatch.of([*TRAIL, *here]), 3) == back
+    assert asked == pytest.approx([15.0] * len(asked))
 
 
 def at(place: float) -> PoseBatch:

@@ -23,6 +23,7 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.limits.limits import Limits
 from hexacell.measurements.records import MeasurementSet
 from hexacell.uncertainty.propagation import Propagation
+from tests.hexacell.conftest import vector
 
 Array = NDArray[np.float64]
 Machine = Callable[[Array], tuple[Geometry, Array]]
@@ -87,8 +88,7 @@ class Laboratory:
     def reached(self, machine: Machine, shown: Array, near: PoseBatch) -> Array:
         """Position and rotation vector (6,) of the platform when the encoders show some joint variables."""
         geometry, joints = machine(shown)
-        start = np.concatenate([near.positions[0], Rotation.from_matrix(near.rotations[0]).as_rotvec()])
-        found: Array | None = self.legs(geometry).closed(joints, start)
+        found: Array | None = self.legs(geometry).closed(joints, vector(near.pose(0)))
         assert found is not None
         return found
 
@@ -97,10 +97,8 @@ class Laboratory:
         rows = []
         for row in range(len(poses)):
             pose = poses[[row]]
-            turn = Rotation.from_matrix(pose.rotations[0])
-            shown = self.legs(commanding).joints(np.concatenate([pose.positions[0], turn.as_rotvec()]))
-            reached = self.reached(machine, shown, pose)
-            turned = Rotation.from_rotvec(reached[3:]) * turn.inv()
+            reached = self.reached(machine, self.legs(commanding).joints(vector(pose.pose(0))), pose)
+            turned = Rotation.from_rotvec(reached[3:]) * Rotation.from_matrix(pose.rotations[0]).inv()
             rows.append(np.concatenate([reached[:3] - pose.positions[0], turned.as_rotvec()]))
         return np.array(rows)
 

@@ -10,13 +10,7 @@ from hexacell.uncertainty.effect_kinds import load_at_work, rail_waves
 from hexacell.uncertainty.possible_causes import ExcessTest, possible_causes
 from tests.hexacell.altered_records import altered
 
-ENCODERS, GUIDES, LOAD, TEMPERATURE, GAUGES = (
-    "errors of the encoders",
-    "guides that are not straight or parallel",
-    "legs that yield under the load",
-    "a temperature that changed while measuring",
-    "the gauges (scale, alignment, drift of the zero) or an oval ball",
-)
+GAUGES = "the gauges (scale, alignment, drift of the zero) or an oval ball"
 CLEARANCE = "clearance in the legs that changes sides with the load"
 
 
@@ -46,42 +40,53 @@ def found_with(noisy, make_problem):
     return identified
 
 
-def moved_by(clean, effect, causes):
+@pytest.fixture(scope="module")
+def placement(clean):
+    return Placement(clean.problem.mechanism, clean.geometry, clean.poses, clean.problem.joints)
+
+
+def moved_by(placement, effect, causes):
     """What the causes (k,) of an effect do to the ball (55, 3), mm."""
-    placement = Placement(clean.problem.mechanism, clean.geometry, clean.poses, clean.problem.joints)
     return -(effect.on_poses(placement)[:, :3] @ causes)
+
+
+def drawn(seed, sigma, *shape):
+    return sigma * np.random.default_rng(seed).standard_normal(shape)
+
+
+def grown(placement):
+    return placement.by_constraints[:, :3] @ drawn(4, 0.1, 6)
 
 
 def first(found):
     return possible_causes(found)[0].name
 
 
-def test_encoders_that_are_wrong_by_a_share_of_their_own(found_with, noisy):
-    joints = np.array([record.joints for record in noisy.records])
-    shares = 3e-3 * np.random.default_rng(1).standard_normal(6)
-    assert first(found_with(joints=shares * joints)) == ENCODERS
-
-
-def test_gauges_that_are_not_square(found_with, noisy):
+@pytest.mark.parametrize(
+    ("name", "errors"),
+    [
+        ("errors of the encoders", lambda p, _: {"joints": drawn(1, 3e-3, 6) * p.joints}),
+        (GAUGES, lambda _, deviations: {"deviations": deviations @ drawn(2, 0.01, 3, 3)}),
+        (
+            "guides that are not straight or parallel",
+            lambda p, _: {"deviations": moved_by(p, rail_waves(1.0, 600.0), drawn(3, 40.0, 12))},
+        ),
+        (
+            "legs that yield under the load",
+            lambda p, _: {"deviations": moved_by(p, load_at_work(1.0, 1.0), np.array([5.0, -5.0, -40.0]))},
+        ),
+        (
+            "a temperature that changed while measuring",
+            lambda p, _: {"deviations": np.linspace(-0.5, 0.5, 55)[:, None] * grown(p)},
+        ),
+    ],
+)
+def test_what_was_simulated_is_named_first(found_with, placement, noisy, name, errors):
     deviations = np.array([record.deviation for record in noisy.records])
-    lean = 0.01 * np.random.default_rng(2).standard_normal((3, 3))
-    assert first(found_with(deviations=deviations @ lean)) == GAUGES
+    assert first(found_with(**errors(placement, deviations))) == name
 
 
-def test_wavy_rails(found_with, clean):
-    waves = 40.0 * np.random.default_rng(3).standard_normal(12)
-    assert first(found_with(deviations=moved_by(clean, rail_waves(1.0, 600.0), waves))) == GUIDES
-
-
-def test_a_load(found_with, clean):
-    assert (
-        first(found_with(deviations=moved_by(clean, load_at_work(1.0, 1.0), np.array([5.0, -5.0, -40.0]))))
-        == LOAD
-    )
-
-
-def test_clearance_that_changes_sides_with_the_load(found_with, clean):
-    placement = Placement(clean.problem.mechanism, clean.geometry, clean.poses, clean.problem.joints)
+def test_clearance_that_changes_sides_with_the_load(found_with, placement):
     sides = np.sign(leg_forces(placement, Weight(np.array([0.0, 0.0, -1.0]))))
     assert (np.ptp(sides, axis=0) > 0.0).any()
     moved = placement.by_constraints[:, :3] @ (0.1 * sides)[..., None]
@@ -104,13 +109,6 @@ def test_more_noise_is_not_explained_by_the_machine_and_no_encoder_lost_its_plac
     assert not [cause.name for cause in causes if "lost its place" in cause.name]
 
 
-def test_legs_that_grow_while_measuring(found_with, clean):
-    placement = Placement(clean.problem.mechanism, clean.geometry, clean.poses, clean.problem.joints)
-    grown = 0.1 * np.random.default_rng(4).standard_normal(6)
-    progress = np.linspace(-0.5, 0.5, 55)[:, None]
-    assert first(found_with(deviations=progress * (placement.by_constraints[:, :3] @ grown))) == TEMPERATURE
-
-
 def test_a_false_reading_is_listed_with_its_record(found_with):
     deviations = np.zeros((55, 3))
     deviations[17, 1] = 0.4
@@ -129,9 +127,9 @@ def test_the_share_of_unknowns_that_explain_no_more_than_chance_is_none(found_wi
     assert test.share_of_gain(goodness.chi2 - goodness.expected, 0) == pytest.approx(1.0)
 
 
-def test_the_gain_of_columns_is_what_the_records_without_the_cause_save(found_with, clean):
+def test_the_gain_of_columns_is_what_the_records_without_the_cause_save(found_with, clean, placement):
     effect = load_at_work(1.0, 1.0)
-    wrong = found_with(deviations=moved_by(clean, effect, np.array([0.0, 0.0, -20.0])))
+    wrong = found_with(deviations=moved_by(placement, effect, np.array([0.0, 0.0, -20.0])))
     saved = wrong.goodness.chi2 - clean.goodness.chi2
     test = ExcessTest(wrong)
     assert test.share_of_columns(test.by_effects(effect)) == pytest.approx(

@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from hexacell.kinematics.parameters import MachinePart
 from hexacell.uncertainty import effect_kinds
 from hexacell.uncertainty.effects import Effect, Occurrence
+from tests.hexacell.conftest import vector
 
 ALUMINIUM = {MachinePart.BASE: 6.0, MachinePart.LEGS: 23.0, MachinePart.PLATFORM: 12.0}
 HALF_LENGTH_MM = 800.0
@@ -202,18 +202,9 @@ def test_a_force_on_the_tool_bends_the_legs_as_springs_in_parallel(laboratory, p
     """Stiffness K = J^T J / c by differences of the leg equations; the platform yields by K^-1 F."""
 
     def yielding(poses):
-        rows = []
-        for position, joints, rotation in zip(
-            poses.poses.positions, poses.joints, poses.poses.rotations, strict=True
-        ):
-            here = np.concatenate([position, Rotation.from_matrix(rotation).as_rotvec()])
-            columns = []
-            for step in 1e-5 * np.eye(6):
-                turned = Rotation.from_rotvec(step[3:]) * Rotation.from_matrix(rotation)
-                there = np.concatenate([here[:3] + step[:3], turned.as_rotvec()])
-                legs = laboratory.legs(laboratory.paper.actual)
-                columns.append((legs.errors(there, joints) - legs.errors(here, joints)) / 1e-5)
-            jacobian = np.array(columns).T
+        legs, rows = laboratory.legs(laboratory.paper.actual), []
+        for row, joints in enumerate(poses.joints):
+            jacobian = legs.jacobian(joints, vector(poses.poses.pose(row)))
             rows.append(np.linalg.inv(jacobian.T @ jacobian)[:, :3] * 5e-5)
         return np.array(rows)
 

@@ -19,7 +19,7 @@ from hexacell.verdict.decision import Verdict
 from hexacell.verdict.model_evidence import ZEROS_DOUBTED
 from hexacell.verdict.verification import HeldOut, Verification, outcome_line, reason_of, verify
 from tests.hexacell.altered_records import later
-from tests.hexacell.conftest import visits
+from tests.hexacell.conftest import reached, visits
 from tests.small_cell import changed
 
 NOISE_MM = 0.01
@@ -87,9 +87,7 @@ def turned_in(frames, axes, there, wanted):
 
 
 @pytest.mark.parametrize("axes", ["", "z", "xyz"])
-def test_an_error_is_none_only_if_a_frame_that_takes_it_away_can_be_taught(
-    cell, result, paper, reach, axes
-):
+def test_an_error_is_none_only_if_a_frame_that_takes_it_away_can_be_taught(cell, result, paper, axes):
     """The error that is stated, against the true robot's motion in the frames that can be taught."""
     robot, found = replace(result[0], work_frame=axes), result[1]
     belief = robot.belief(found)
@@ -99,7 +97,7 @@ def test_an_error_is_none_only_if_a_frame_that_takes_it_away_can_be_taught(
 
     def there(poses):
         return np.array(
-            [reach(paper.actual, found.geometry, poses.pose(row))[1] for row in range(len(poses))]
+            [reached(paper.actual, found.geometry, poses.pose(row))[1] for row in range(len(poses))]
         )
 
     workspace = there(task.workspace)

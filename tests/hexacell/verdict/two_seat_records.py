@@ -3,16 +3,13 @@
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from hexacell.cell.uncertainty import LengthCheckSettings
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record, deviation_of, joints_of
 from hexacell.robot.model import Robot
-
-PROBE_MM = np.array([1.0, -0.8, 0.6])
-TILTS = ((0.0, 0.0), (10.0, 0.0), (-10.0, 0.0), (0.0, 10.0))
-NOTHING = np.zeros(3)
+from tests.hexacell.conftest import vector
+from tests.hexacell.uncertainty.two_seats import TwoSeats
 
 
 def two_seat_records(
@@ -32,49 +29,32 @@ def two_seat_records(
     mounting on.
     """
     random = np.random.default_rng(5)
-    rows = [
-        (mounting, number, pose)
-        for mounting in range(1, fixture.mountings + 1)
-        for number, pose in enumerate(_commands(fixture, mounting), start=1)
-    ]
-    shown = [legs(robot.controller).joints(_vector(pose)) for *_, pose in rows]
-    balls = np.array(
-        [
-            _ball(robot, legs(paper.actual), q / (1.0 + 1e-6 * long_um_m), p)
-            for q, (*_, p) in zip(shown, rows, strict=True)
-        ]
-    )
     first, second = np.array(fixture.first_seat), np.array(fixture.second_seat)
-    between = (second - first) / fixture.distance_mm * (distance_mm or fixture.distance_mm)
-    records = []
-    for (mounting, number, pose), joints, ball in zip(rows, shown, balls, strict=True):
-        seat = balls[0] + (between if mounting % 2 == 0 else NOTHING)
-        deviation = (
-            ball - seat - (zeroed_mm if mounting > 1 else 0.0) + noise_mm * random.standard_normal(3)
+    seats = TwoSeats(
+        fixture.distance_mm,
+        (second - first) / fixture.distance_mm,
+        first,
+        fixture.mountings,
+        zeroed_mm=np.full(3, zeroed_mm),
+        true_mm=distance_mm,
+    )
+    mountings, poses = zip(*seats.commands(), strict=True)
+    shown = np.array([legs(robot.controller).joints(vector(pose)) for pose in poses])
+    moved = shown / (1.0 + 1e-6 * long_um_m)
+    balls = np.array([_ball(robot, legs(paper.actual), *one) for one in zip(moved, poses, strict=True)])
+    deviations = seats.deviations(np.array(mountings), balls, random)
+    deviations += noise_mm * random.standard_normal(balls.shape)
+    shown += noise_mm * random.standard_normal(shown.shape)
+    each = len(poses) // fixture.mountings
+    return MeasurementSet(
+        tuple(
+            Record(mounting, row % each + 1, pose, joints_of(shown[row]), deviation_of(deviations[row]))
+            for row, (mounting, pose) in enumerate(seats.commands())
         )
-        read = joints + noise_mm * random.standard_normal(6)
-        records.append(Record(mounting, number, pose, joints_of(read), deviation_of(deviation)))
-    return MeasurementSet(tuple(records))
-
-
-def _commands(fixture: LengthCheckSettings, mounting: int) -> list[Pose]:
-    place = np.array(fixture.first_seat if mounting % 2 else fixture.second_seat)
-    middle = [_pose(place, a, b) for a, b in TILTS]
-    return [*middle, _pose(place + PROBE_MM, 0.0, 0.0)]
-
-
-def _pose(position: Any, a: float, b: float) -> Pose:
-    x, y, z = position.tolist()
-    return Pose(x, y, z, a, b)
-
-
-def _vector(pose: Pose) -> Any:
-    turn = Rotation.from_euler("xyz", [pose.a, pose.b, pose.c], degrees=True)
-    return np.concatenate([[pose.x, pose.y, pose.z], turn.as_rotvec()])
+    )
 
 
 def _ball(robot: Robot, legs: Any, joints: Any, pose: Pose) -> Any:
     """Where the ball is, in the controller's base frame."""
-    near = robot.from_commands([pose])
-    start = np.concatenate([near.positions[0], Rotation.from_matrix(near.rotations[0]).as_rotvec()])
-    return robot.frames.base.T @ legs.closed(joints, start)[:3]
+    near = vector(robot.from_commands([pose]).pose(0))
+    return robot.frames.base.T @ legs.closed(joints, near)[:3]

@@ -22,7 +22,6 @@ from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import GaugePlacement, Question
 from procedures.run.state import RunState, fold
 from procedures.steps import events
-from procedures.steps.move import Move
 from procedures.workflow.length import BESIDE_MM
 from procedures.workflow.preflight import plan_failures
 from tests.procedures.fakes import Approver, FakeThermometer
@@ -214,26 +213,6 @@ async def test_a_seat_out_of_reach_is_told_before_anything_moves(make_length_rig
     failures = await plan_failures(calibration, unattended=True)
     assert failures
     assert all("length check, seat " in str(failure) for failure in failures)
-
-
-@pytest.mark.slow
-async def test_a_run_checks_the_scale_before_its_verdict(make_rig) -> None:
-    """1e-3 of all encoders: without the check the run passes, and errs by 0.2 mm."""
-    changes = {
-        "simulation__encoders__common_scale_um_m": 1000.0,
-        "acceptance__position_mm": 0.12,
-        "acceptance__orientation_deg": 0.2,
-    }
-    rig = make_rig(length_check=True, **changes)
-    told: list[Any] = []
-    await rig.run(lambda event, _: told.append(event))
-    steps = [event.step for event in told if isinstance(event, events.StepBegun)]
-    moves = [step.at.phase for step in steps if isinstance(step, Move)]
-    assert moves.index(Phase.LENGTH) > max(n for n, phase in enumerate(moves) if phase is Phase.AFTER)
-    accuracy = rig.engine.state.judged.verification.accuracy
-    assert accuracy.length.long_um_m == pytest.approx(1000.0, abs=accuracy.length.expanded_um_m)
-    assert accuracy.position.value > 0.12
-    assert rig.engine.state.judged.verdict is not Verdict.PASS
 
 
 async def test_gauges_mounted_the_wrong_way_round_are_named_at_once(make_length_rig) -> None:

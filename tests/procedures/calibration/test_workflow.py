@@ -87,6 +87,7 @@ TABLE: Table = {
     "refused there": ([*s().whole(1)[:3], s().arrived(2), s().refused()], "P1/o02/move"),
     "refused too often": (MISSED, "P1/o01/move"),
     "back after too many refusals": ([*MISSED, s().arrived(1)], "P1/close"),
+    "the reference refused": ([s().excluded(1)], "P2/o01/move"),
     "closed with few records": (s().whole(1), "P2/o01/move"),
     "interrupted at a pose": ([s().arrived(), INTERRUPTED], "locate"),
     "found after an interruption": ([s().arrived(), INTERRUPTED, LOCATED], "P1/o01/move"),

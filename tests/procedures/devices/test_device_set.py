@@ -155,9 +155,6 @@ def test_another_port_or_setting_is_another_device(change: dict[str, str]) -> No
         require_known([now], [BEFORE])
 
 
-def test_what_a_journal_of_before_does_not_tell_is_not_compared() -> None:
-    require_known([BEFORE], [replace(BEFORE, settings="", port="")])
-
-
-def test_a_remark_is_not_compared() -> None:
-    require_known([replace(BEFORE, remark="it reports a warning")], [BEFORE])
+@pytest.mark.parametrize(("remark", "before"), [("", {"settings": "", "port": ""}), ("a warning", {})])
+def test_what_a_journal_of_before_does_not_tell_is_not_compared_nor_a_remark(remark, before) -> None:
+    require_known([replace(BEFORE, remark=remark)], [replace(BEFORE, **before)])

@@ -2,7 +2,7 @@
 
 import asyncio
 import math
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -25,6 +25,16 @@ def at_end(name: str) -> GaugeAtEnd:
     return GaugeAtEnd("is at an end of its travel", subject=f"gauge {name}")
 
 
+def slowed(bench: Any, seconds: float, drift: float = 0.0) -> None:
+    """Let the readings of a gauge take some time, and drift by so much in a second."""
+
+    def shown() -> float:
+        bench.clock.time_s += seconds
+        return float(bench.clock.now()) * drift
+
+    bench.gauges[0].shown = shown
+
+
 @pytest.mark.parametrize("interval_s", [TIMING.interval_s, 5.0, 0.01])
 async def test_a_robot_at_rest_is_settled_after_one_window(bench, interval_s: float) -> None:
     timing = TIMING.model_copy(update={"interval_s": interval_s})
@@ -37,11 +47,7 @@ async def test_a_robot_at_rest_is_settled_after_one_window(bench, interval_s: fl
 
 @pytest.mark.parametrize("reading_s", [0.0, 0.04, 0.1, 0.25])
 async def test_readings_begin_an_interval_apart_or_as_soon_as_the_devices_are_ready(bench, reading_s):
-    def slow() -> float:
-        bench.clock.time_s += reading_s
-        return 0.0
-
-    bench.gauges[0].shown = slow
+    slowed(bench, reading_s)
     settled = await settle(bench.devices, TIMING, bench.clock)
     series = await read_series(bench.devices, TIMING, bench.clock, 12)
     for window in (settled.window, series.window):
@@ -143,23 +149,14 @@ async def test_other_failures_are_not_waited_out(bench) -> None:
 
 async def test_slow_readings_that_agree_settle_after_the_time_limit(bench) -> None:
     """Readings that take long, or a machine that stalls, are no vibration."""
-
-    def slow() -> float:
-        bench.clock.time_s += 25.0
-        return 0.0
-
-    bench.gauges[0].shown = slow
+    slowed(bench, 25.0)
     settled = await settle(bench.devices, TIMING, bench.clock)
     assert bench.clock.now() > TIMING.give_up_s
     assert len(settled.window) == TIMING.readings
 
 
 async def test_slow_readings_that_never_agree_end_too(bench) -> None:
-    def slow() -> float:
-        bench.clock.time_s += 25.0
-        return float(bench.clock.now()) / 1000.0
-
-    bench.gauges[0].shown = slow
+    slowed(bench, 25.0, drift=1e-3)
     with pytest.raises(DeviceError, match="gauge x by"):
         await settle(bench.devices, TIMING, bench.clock)
     assert bench.gauges[0].reads == LEAST_WINDOWS * TIMING.readings

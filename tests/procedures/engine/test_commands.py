@@ -91,6 +91,14 @@ class Stage:
         if key:
             await self.script.held.wait()
 
+    async def paused_at(self, key: str, *, at_once: bool) -> None:
+        await self.held_at(key)
+        self.engine.queue.put(Pause(at_once))
+        await asyncio.sleep(0)
+        if not at_once:
+            self.script.let_go.set()
+        await self.until(events.Paused)
+
     async def over(self) -> events.Ended:
         assert self.running
         self.script.let_go.set()
@@ -111,11 +119,7 @@ async def stage(bench, journal) -> AsyncIterator[Stage]:
 
 
 async def test_a_pause_after_the_record_waits_for_the_record(stage: Stage, bench) -> None:
-    await stage.held_at("P1/o02/move")
-    stage.engine.queue.put(Pause())
-    await asyncio.sleep(0)
-    stage.script.let_go.set()
-    await stage.until(events.Paused)
+    await stage.paused_at("P1/o02/move", at_once=False)
     assert stage.kinds[-3:] == ["arrived", "sampled", "paused"]
     assert stage.engine.status is Status.PAUSED
     assert "stop" not in bench.controller.log
@@ -129,9 +133,7 @@ async def test_a_pause_after_the_record_waits_for_the_record(stage: Stage, bench
 
 @pytest.mark.parametrize("key", ["P1/o02/move", "P1/o02/sample"])
 async def test_a_pause_at_once_stops_motion_and_the_step_is_decided_again(stage, bench, key: str) -> None:
-    await stage.held_at(key)
-    stage.engine.queue.put(Pause(at_once=True))
-    await stage.until(events.Paused)
+    await stage.paused_at(key, at_once=True)
     assert bench.controller.log == ["prepare", "stop"]
     assert stage.engine.state.position_unknown
     assert stage.engine.state.set(P1).reference_unverified
@@ -183,11 +185,7 @@ async def test_measure_again_discards_the_record_or_the_set(stage, command, even
 
 
 async def test_records_may_be_undone_during_a_pause(stage: Stage) -> None:
-    await stage.held_at("P1/o02/sample")
-    stage.engine.queue.put(Pause())
-    await asyncio.sleep(0)
-    stage.script.let_go.set()
-    await stage.until(events.Paused)
+    await stage.paused_at("P1/o02/sample", at_once=False)
     stage.engine.queue.put(Undo())
     await stage.until(events.RecordDiscarded)
     assert stage.engine.status is Status.PAUSED
@@ -241,9 +239,7 @@ async def test_an_abort_ends_the_run_within_a_step_and_stops_motion(stage: Stage
 
 @pytest.mark.parametrize("command", [Stop(), Abort()])
 async def test_a_stop_or_abort_ends_a_paused_run_at_once(stage: Stage, command: Any) -> None:
-    await stage.held_at("P1/o02/move")
-    stage.engine.queue.put(Pause(at_once=True))
-    await stage.until(events.Paused)
+    await stage.paused_at("P1/o02/move", at_once=True)
     stage.engine.queue.put(command)
     with pytest.raises(Interruption):
         await stage.running  # type: ignore[misc]

@@ -1,12 +1,9 @@
-"""Every move of a run gets a duration, by where gauges are; simulated sliders keep to the speeds."""
+"""Every move of a run gets a duration, by where gauges are."""
 
 from typing import Any
 
-import numpy as np
 import pytest
 
-from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.motion.trajectory import SHORTEST_S
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
 from procedures.steps import events
@@ -74,34 +71,3 @@ async def test_a_move_with_gauges_at_the_ball_is_as_much_slower_as_stated(make_r
         await rig.performer.perform(step, fold(history))
     _, free_s, _, at_gauges_s = rig.controller.durations_s
     assert at_gauges_s == pytest.approx(free_s * 40.0 / 25.0)
-
-
-@pytest.mark.slow
-async def test_in_a_whole_run_no_slider_and_no_point_of_the_platform_is_faster_than_allowed(
-    recording, replayed
-):
-    rig = replayed(recording.until(events.SetClosed, count=1))
-    fastest = {"joint": 0.0, "edge": 0.0}
-    real = rig.machine.move
-
-    def watched(pose: Pose, duration_s: float) -> None:
-        real(pose, duration_s)
-        motion = rig.physics._motion
-        rate = 1.0 / (motion.duration_s - 0.2)  # of the path a second, between the ramps
-        rows = np.diff(motion.path, axis=0) * rate * (len(motion.path) - 1)
-        fastest["joint"] = max(fastest["joint"], float(np.abs(rows).max()))
-        line = rig.machine._line
-        edge = line.positions[:, None] + rig.calibration.robot.controller["B"] @ np.swapaxes(
-            line.rotations, 1, 2
-        )
-        steps = np.linalg.norm(np.diff(edge, axis=0), axis=2) * rate * (len(line) - 1)
-        fastest["edge"] = max(fastest["edge"], float(steps.max()))
-
-    rig.machine.move = watched
-    rig.controller.machine = rig.machine
-    await rig.run()
-    speed = rig.cell.settings.speed
-    assert 0.9 * speed.joint_at_gauges < fastest["joint"] < 1.01 * speed.joint_at_gauges
-    assert fastest["edge"] < 1.1 * speed.edge_at_gauges_mm_s, "another geometry after the write-back"
-    assert min(rig.controller.durations_s) >= SHORTEST_S
-    assert isinstance(rig.machine._line, PoseBatch)

@@ -26,7 +26,6 @@ from hexacell.cell.recovery import Action, Escalations, FailureKind
 from hexacell.errors import (
     AnswerNeeded,
     DeviceError,
-    ExitCode,
     FileError,
     HexacellError,
     LimitError,
@@ -72,21 +71,6 @@ async def test_an_unattended_run_retries_a_silent_gauge_and_then_redoes_its_set(
     assert rig.gauges[1].closed == reopened
     assert [str(event.at) for event in happened(rig, events.SetInvalidated)] == ["P2"] * voided
     assert rig.gauges[0].closed == 0, "the others are left alone"
-
-
-@pytest.mark.slow
-async def test_an_unattended_run_ends_after_a_bounded_number_of_attempts(rig) -> None:
-    silent = failing(KEY, lambda: rig.gauges[1].failures.append(SILENT), 100)
-    with pytest.raises(GaugeSilent):
-        await rig.run(silent, policy=UNATTENDED)
-    assert [event.action.value for event in happened(rig, events.Failed)] == [
-        "retry",
-        "redo-set",
-        "redo-set",
-    ]
-    assert happened(rig, events.Interrupted)[-1].exit_code == ExitCode.HARDWARE
-    assert rig.engine.status is Status.FAULTED, "a fault latches"
-    assert rig.controller.log[-1] == "stop"
 
 
 def jumped_while_away(rig: Any, jump_mm: float) -> Any:

@@ -55,8 +55,7 @@ async def test_unattended_what_is_not_stated_is_refused_with_the_key_to_set(star
 
 
 async def test_a_person_is_asked_for_each(startup) -> None:
-    person = Approver()
-    person.startup = ["yes", "yes", "yes"]
+    person = Approver(startup=["yes"] * 3)
     starting, bench = startup(NOTHING, person, COLD)
     await starting.prepare(NEW)
     assert bench.controller.log[-3:] == DONE
@@ -68,9 +67,7 @@ async def test_a_person_is_asked_for_each(startup) -> None:
 
 
 async def test_a_person_who_declines_ends_the_run(startup) -> None:
-    person = Approver()
-    person.startup = ["no"]
-    starting, bench = startup(NOTHING, person, [StartupAction.HOME])
+    starting, bench = startup(NOTHING, Approver(startup=["no"]), [StartupAction.HOME])
     with pytest.raises(Interruption, match="is not homed, which was left as it is"):
         await starting.prepare(NEW)
     assert bench.controller.log == ["prepare"]
@@ -80,9 +77,7 @@ async def test_a_later_emergency_stop_needs_a_person_whatever_the_cell_file_stat
     starting, bench = startup(EVERYTHING, UnattendedOperator(), [StartupAction.RESET_ESTOP])
     with pytest.raises(AnswerNeeded, match="reset it at the controller, then begin or resume"):
         await starting.prepare(NEW)
-    person = Approver()
-    person.startup = ["yes"]
-    starting, bench = startup(EVERYTHING, person, [StartupAction.RESET_ESTOP])
+    starting, bench = startup(EVERYTHING, Approver(startup=["yes"]), [StartupAction.RESET_ESTOP])
     await starting.prepare(NEW)
     assert bench.controller.log[-1] == StartupAction.RESET_ESTOP.value, "before a run a person may say so"
 

@@ -170,7 +170,7 @@ def test_a_wall_clock_that_jumps_leaves_the_monotonic_times_sorted(path: Path, m
 class FullDisk:
     """A disk with room for some more bytes; its faults come from the calls they would come from."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, room: int, *, cuts: bool = True) -> None:
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, room: int, cuts: bool) -> None:
         self.room = room
         self.cuts = cuts
         self.write_told, self._truncate = os.write, os.ftruncate
@@ -190,17 +190,18 @@ class FullDisk:
         self._truncate(descriptor, length)
 
 
-@pytest.mark.parametrize("room", [0, 1, 40])
-def test_a_full_disk_leaves_the_journal_unchanged(path: Path, monkeypatch, room: int) -> None:
+@pytest.mark.parametrize(("room", "cuts"), [(0, True), (1, True), (40, True), (40, False)])
+def test_a_full_disk_leaves_the_journal_unchanged(path: Path, monkeypatch, room: int, cuts: bool) -> None:
+    """Half a line that could not be cut off is cut off before the next."""
     with Journal(path) as journal:
         journal.append(TOLD[0])
         before = path.read_bytes()
-        disk = FullDisk(monkeypatch, room)
+        disk = FullDisk(monkeypatch, room, cuts)
         with pytest.raises(FileError, match="disk is full"):
             journal.append(TOLD[1])
-        assert path.read_bytes() == before
-        assert journal.events == TOLD[:1]
-        disk.room = 10_000
+        assert (path.read_bytes() == before) is cuts
+        assert read_journal(path) == journal.events == TOLD[:1]
+        disk.cuts, disk.room = True, 10_000
         journal.append(TOLD[1])
     assert read_journal(path) == TOLD[:2]
 
@@ -221,26 +222,6 @@ def test_partial_writes_are_continued_to_a_whole_line(path: Path, monkeypatch) -
         monkeypatch.setattr(os, "write", lambda descriptor, data: write(descriptor, data[:7]))
         journal.append(TOLD[0])
     assert read_journal(path) == TOLD[:1]
-
-
-def test_half_a_line_that_could_not_be_cut_off_is_cut_off_before_the_next(path: Path, monkeypatch) -> None:
-    with Journal(path) as journal:
-        journal.append(TOLD[0])
-        disk = FullDisk(monkeypatch, 40)
-        real_write = disk.write
-
-        def write_then_break(descriptor: int, data: bytes) -> int:
-            disk.cuts = False
-            return real_write(descriptor, data)
-
-        monkeypatch.setattr(os, "write", write_then_break)
-        with pytest.raises(FileError, match="disk is full"):
-            journal.append(TOLD[1])
-        assert read_journal(path) == TOLD[:1]
-        disk.cuts, disk.room = True, 10_000
-        monkeypatch.setattr(os, "write", real_write)
-        journal.append(TOLD[1])
-    assert read_journal(path) == TOLD[:2]
 
 
 def test_an_event_that_cannot_be_synced_is_not_in_the_journal(path: Path, monkeypatch) -> None:

@@ -219,15 +219,6 @@ def test_one_manipulated_event_gives_one_difference(recording, replay) -> None:
     assert {difference.line for difference in replay(history, scope=Scope.RESULTS).differences} == {line}
 
 
-def test_different_wording_is_reported_as_an_aspect_of_its_own(recording, replay) -> None:
-    report = replay(
-        altered(recording.history, events.ResultValidated, {"line": "all is well"}), scope=Scope.RESULTS
-    )
-    [difference] = report.differences
-    assert difference.aspect is Aspect.WORDS
-    assert difference.change.field == "line"
-
-
 def test_a_run_that_ended_too_early_is_reported(recording, replay) -> None:
     early = [*recording.until(events.SetClosed), recording.history[-1]]
     [difference] = replay(early).differences

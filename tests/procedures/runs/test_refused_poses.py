@@ -48,21 +48,6 @@ async def test_a_resumed_run_does_not_send_it_again(make_rig) -> None:
     assert len(happened(rig, events.RecordTaken)) >= 9
 
 
-POINTS = ((100.0, -100.0, 500.0), (0.0, 150.0, 520.0), (-100.0, 100.0, 500.0))
-
-
-@pytest.mark.slow
-async def test_a_point_whose_reference_is_refused_is_left(make_rig) -> None:
-    rig = make_rig(
-        **limits(y=(-120.0, 120.0)), identification__points=POINTS, identification__orientations=7
-    )
-    await run_until(rig, events.SetClosed, count=2)
-    (refusal,) = [one for one in excluded(rig) if one.orientation == 1]
-    assert (refusal.at.phase, refusal.at.point) == (Phase.IDENTIFY, 2)
-    keys = {taken.at for taken in happened(rig, events.RecordTaken)}
-    assert {key.point for key in keys if key.phase is Phase.IDENTIFY} == {1, 3}
-
-
 async def test_too_few_points_that_are_not_refused_are_said_in_words(make_rig) -> None:
     rig = make_rig(**limits(x=(-50.0, 500.0)))
     with pytest.raises(IdentifiabilityError, match="point"):

@@ -116,36 +116,28 @@ def test_one_lost_record_does_not_make_a_fit_better_by_far_than_one_that_has_it(
 
 
 @pytest.mark.parametrize(
-    ("before_mm", "after_mm", "confirmed"),
+    ("before_mm", "after_mm", "gain", "confirmed"),
     [
-        (0.1, 0.05, False),  # fewer residuals, and still far too large
-        (0.1, 0.0, True),  # the corrected records agree
-        (1.0, 0.05, True),  # far better, and something else is wrong as well
+        (0.1, 0.05, 0.5, False),  # fewer residuals, and still far too large
+        (0.1, 0.0, 0.5, True),  # the corrected records agree
+        (1.0, 0.05, 0.5, True),  # far better, and something else is wrong as well
+        (0.02, 0.015, 0.0, False),  # near zero, readings with another sign are nearly the same readings
     ],
 )
 def test_a_gauge_fault_is_confirmed_by_agreement_or_by_far_smaller_residuals(
-    noisy, make_problem, monkeypatch, before_mm, after_mm, confirmed
+    noisy, make_problem, monkeypatch, before_mm, after_mm, gain, confirmed
 ):
     def fitted(amplitude_mm):
         problem = make_problem(with_encoders(noisy, waves(5, amplitude_mm)))
         return CorrectedFit(problem, problem, fit_regularized(problem))
 
     current, corrected = fitted(before_mm), fitted(after_mm)
-    assert corrected.fit.goodness.chi2 < 0.5 * current.fit.goodness.chi2
-    monkeypatch.setattr(CorrectedFit, "corrected_for", lambda *_: corrected)
-    found = confirmed_by_refit(current, replace(ALL_IN_INCHES, gain=0.5 * current.fit.goodness.chi2))
-    assert found is (corrected if confirmed else None)
-
-
-def test_a_gauge_fault_that_hardly_lowers_the_residuals_is_not_named(noisy, make_problem, monkeypatch):
-    """Near zero, readings with another sign are nearly the same readings."""
-    before, after = (make_problem(with_encoders(noisy, waves(5, mm))) for mm in (0.02, 0.015))
-    current = CorrectedFit(before, before, fit_regularized(before))
-    corrected = CorrectedFit(after, after, fit_regularized(after))
     assert not current.is_consistent
-    assert corrected.is_consistent
+    assert corrected.is_consistent is (after_mm < 0.05)
+    assert corrected.fit.goodness.chi2 < (1.0 - gain) * current.fit.goodness.chi2
     monkeypatch.setattr(CorrectedFit, "corrected_for", lambda *_: corrected)
-    assert confirmed_by_refit(current, replace(ALL_IN_INCHES, gain=0.0)) is None
+    found = confirmed_by_refit(current, replace(ALL_IN_INCHES, gain=gain * current.fit.goodness.chi2))
+    assert found is (corrected if confirmed else None)
 
 
 def test_a_correction_that_loses_most_records_is_not_better(noisy, make_problem):

@@ -20,6 +20,7 @@ from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.mechanism import FrameFreedom
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import FrameTransform, Pose, PoseBatch
+from tests.hexacell.conftest import reached, vector
 
 LENGTH = 180.0
 
@@ -136,10 +137,10 @@ def test_the_same_machine_returns_to_the_frames_it_was_taught_in(paper, origin, 
     assert chosen.displacement.orientation_largest_deg < 1e-8
 
 
-def test_no_other_frames_move_the_task_poses_less(paper, reach, vector_of, calibrated):
+def test_no_other_frames_move_the_task_poses_less(paper, calibrated):
     """A general minimizer over six numbers, on poses that scipy found, gets as far and no farther."""
-    seen = [reach(paper.actual, paper.nominal, pose)[1] for pose in TASK]
-    wanted = np.array([vector_of(pose) for pose in TASK])
+    seen = [reached(paper.actual, paper.nominal, pose)[1] for pose in TASK]
+    wanted = np.array([vector(pose) for pose in TASK])
     length = np.linalg.norm(paper.actual["B"], axis=1).mean()
 
     def left(frames):
@@ -160,13 +161,13 @@ def test_no_other_frames_move_the_task_poses_less(paper, reach, vector_of, calib
 
 
 def test_the_chosen_geometry_has_the_displaced_poses_at_the_joints_of_the_taught_ones(
-    paper, legs, vector_of, calibrated
+    paper, legs, calibrated
 ):
     for row, pose in enumerate(TASK):
-        joints = legs(paper.nominal).joints(vector_of(pose))
-        there = legs(calibrated.geometry).closed(joints, vector_of(pose))
-        angle = Rotation.from_rotvec(there[3:]) * Rotation.from_rotvec(vector_of(pose)[3:]).inv()
-        distance = np.linalg.norm(there[:3] - vector_of(pose)[:3])
+        joints = legs(paper.nominal).joints(vector(pose))
+        there = legs(calibrated.geometry).closed(joints, vector(pose))
+        angle = Rotation.from_rotvec(there[3:]) * Rotation.from_rotvec(vector(pose)[3:]).inv()
+        distance = np.linalg.norm(there[:3] - vector(pose)[:3])
         assert distance == pytest.approx(calibrated.displacement.distances_mm[row], abs=1e-7)
         assert angle.magnitude() == pytest.approx(calibrated.displacement.angles[row], abs=1e-9)
 

@@ -1,6 +1,5 @@
 """Predicted pose errors, against a simulated machine."""
 
-from dataclasses import replace
 from itertools import product
 from typing import Any
 
@@ -14,6 +13,7 @@ from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicte
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.pose import Pose, PoseBatch
+from tests.hexacell.conftest import reached, vector
 from tests.hexacell.uncertainty.conftest import belief_of
 
 DRAWS = 60
@@ -62,14 +62,12 @@ def errors_after_teaching(reached, commanded, taught_on, length):
     return np.stack([np.linalg.norm(left[:, :3], axis=1), np.linalg.norm(left[:, 3:], axis=1)], axis=1)
 
 
-def test_before_is_what_a_machine_like_the_estimate_does(
-    identified, paper, reach, vector_of, workspace, task, stated
-):
+def test_before_is_what_a_machine_like_the_estimate_does(identified, paper, workspace, task, stated):
     commands = [*workspace, *task]
-    reached = np.array([reach(identified.geometry, paper.nominal, pose)[1] for pose in commands])
+    seen = np.array([reached(identified.geometry, paper.nominal, pose)[1] for pose in commands])
     radius = np.linalg.norm(identified.geometry["B"], axis=1).mean()
     rows = slice(0, len(workspace))
-    left = errors_after_teaching(reached, np.array([vector_of(p) for p in commands]), rows, radius)
+    left = errors_after_teaching(seen, np.array([vector(p) for p in commands]), rows, radius)
     found = stated
     np.testing.assert_allclose(found.before.distances_mm, left[-2:, 0], rtol=1e-5)
     np.testing.assert_allclose(found.before.angles, left[-2:, 1], rtol=1e-5)
@@ -79,9 +77,9 @@ def test_before_is_what_a_machine_like_the_estimate_does(
 
 
 def test_after_is_the_scatter_of_machines_that_the_covariance_allows(
-    identified, legs, vector_of, workspace, task, stated
+    identified, legs, workspace, task, stated
 ):
-    commands = np.array([vector_of(pose) for pose in [*workspace, *task]])
+    commands = np.array([vector(pose) for pose in [*workspace, *task]])
     joints = [legs(identified.geometry).joints(command) for command in commands]
     radius = np.linalg.norm(identified.geometry["B"], axis=1).mean()
     random = np.random.default_rng(8)
@@ -97,21 +95,6 @@ def test_after_is_the_scatter_of_machines_that_the_covariance_allows(
     standard_error = np.std(squares, axis=0, ddof=1) / np.sqrt(DRAWS)
     assert (np.abs(np.mean(squares, axis=0) - told) < 4.0 * standard_error).all()
     assert (standard_error < 0.2 * told).all()
-
-
-@pytest.mark.slow
-def test_repeated_measurements_have_the_predicted_errors(repeated, paper, workspace):
-    """The truth stands in for the machine: its distance from each estimate is that estimate's error."""
-    poses = PoseBatch.of(workspace)
-    truth = repeated[0].problem.mechanism.convention.free_parameters(paper.actual)
-    seen = []
-    for one in repeated:
-        belief = replace(belief_of(one, one.geometry, paper.branch), free=truth)
-        found = predicted_accuracy(belief, task=poses, workspace=poses)
-        assert found is not None
-        seen.append(found.before.position_rms_mm**2)
-    told = accuracy_of(repeated[0], paper.nominal, paper.branch, task=poses, workspace=poses)
-    assert np.sqrt(np.mean(seen)) == pytest.approx(told.after.position_rms_mm, rel=0.25)
 
 
 def test_unreachable_poses_are_named_and_left_out(identified, paper, workspace, task):

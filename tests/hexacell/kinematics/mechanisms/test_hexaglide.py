@@ -13,14 +13,15 @@ from hexacell.kinematics.mechanisms.six_rails import SixRails
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import TurnedAxes, turns_of
 from tests.geometries import hexaglide_geometry, six_rails_geometry
+from tests.hexacell.conftest import vector
 from tests.hexacell.kinematics.numeric import POSES
 
 BRANCHES = list(product((-1, 1), repeat=6))
 
 
 @given(POSES)
-def test_inverse_is_the_closed_form(hexaglide, paper, legs, vector_of, pose):
-    expected = legs(paper.actual).joints(vector_of(pose))
+def test_inverse_is_the_closed_form(hexaglide, paper, legs, pose):
+    expected = legs(paper.actual).joints(vector(pose))
     found = hexaglide.inverse(paper.actual, paper.branch, PoseBatch.of([pose]))[0]
     np.testing.assert_allclose(found, expected, atol=1e-9)  # NaN where NaN is expected
 

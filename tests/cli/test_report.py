@@ -8,6 +8,7 @@ from html import unescape
 from pathlib import Path
 from typing import Any
 
+from hexacell.lengths import shown
 from procedures.journal.journal import encode, read_entries
 from procedures.steps import events
 from tests.mutations.journals import with_checksum
@@ -42,7 +43,8 @@ def test_the_page_says_what_the_run_found_the_verdict_first(typed_here, demo, ru
     closed = next(
         one.event for one in read_entries(run / "journal.jsonl") if isinstance(one.event, events.SetClosed)
     )
-    assert re.search(rf"\bpoint 1 11 \d\.\d{{3}} {max(map(abs, closed.drift_mm)):.3f} point 2 11 ", said)
+    drift = re.escape(shown(max(map(abs, closed.drift_mm))))
+    assert re.search(rf"\bpoint 1 11 [\d.]+ [mu]m {drift} point 2 11 ", said)
     for parameter in json.loads((run / "result.json").read_text())["parameters"]:
         is_free = parameter["sigma"] > 0.0
         assert (re.search(rf"\b{parameter['name']} mm -?\d", said) is not None) == is_free

@@ -24,7 +24,7 @@ VALUE = b"-1.234\n"
 @pytest.mark.parametrize("protocol", [*PROTOCOLS, *DISPLAYS, *DESCRIBED])
 async def test_every_gauge_is_opened_though_it_restarts_then(protocol, monkeypatch):
     monkeypatch.setattr("tests.drivers.simulated.gauges.served.cell.WORST_LATENCY_S", LATENCY_S)
-    async with cell([protocol] * 3, timeout_s=0.05, restart_s=RESTART_S) as made:
+    async with cell([protocol] * 3, timeout_s=0.25, restart_s=RESTART_S) as made:
         await made.gauges["x"].open()
         assert (await made.gauges["x"].read()).value_mm == pytest.approx(1.0, abs=0.01)
 

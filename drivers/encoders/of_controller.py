@@ -70,9 +70,7 @@ class ControllerScales:
             )
         settings = self._settings
         terms = zip(joints, self._zeros(), settings.direction, settings.offset, strict=True)
-        counts = tuple(
-            round(sign * (joint - zero - offset) / settings.step) for joint, zero, sign, offset in terms
-        )
+        counts = tuple(round(sign * (q - zero - offset) / settings.step) for q, zero, sign, offset in terms)
         return EncoderSample(counts, joint_variables(counts, settings), settings.unit)
 
     async def close(self) -> None:

@@ -136,9 +136,8 @@ class SimulatedCell(ServedGroup):
             )
             self.gauges, self.encoders = sensors.gauges, sensors.encoders
             self.controller = served.enter_context(SimulatedController(self.machine, settings.controller))
-            warmth = served.enter_context(
-                SimulatedThermometers(settings.thermometers, self.physics.celsius)
-            )
+            warmth = SimulatedThermometers(settings.thermometers, self.physics.celsius)
+            served.enter_context(warmth)
             self.faults = CellFaults(self.gauges, self.encoders, self.controller, self.machine, stop_file)
             self.schedule = served.enter_context(FaultSchedule(self.faults, clock, simulation.faults))
             self.physics.on_motion_start = self.schedule.on_motion_start

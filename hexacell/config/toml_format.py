@@ -85,12 +85,10 @@ class NativeToml:
             before = Geometry.of(there, found["geometry"])
             after = Geometry(there, [values[name] for name in there.names])
             for kind in there.kinds:
-                old, half_of_last = before[kind.symbol], 0.5 * 10.0**-kind.unit.decimals
+                old, decimals = before[kind.symbol], kind.unit.decimals
                 for index, new in np.ndenumerate(after[kind.symbol]):
-                    if abs(new - old[index]) > half_of_last:
-                        tokens["geometry", kind.symbol, *index] = write_number(
-                            float(new), kind.unit.decimals
-                        )
+                    if abs(new - old[index]) > 0.5 * 10.0**-decimals:
+                        tokens["geometry", kind.symbol, *index] = write_number(float(new), decimals)
         changed = document.replaced(tokens)
         return changed if corrections is None else with_corrections(changed, corrections)
 

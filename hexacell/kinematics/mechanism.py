@@ -66,10 +66,8 @@ class FrameConvention:
     @cached_property
     def free_names(self) -> tuple[str, ...]:
         """Names of the free parameters; a group of equal parameters has the name of its first."""
-        dependent = {name for group in self.equal for name in group[1:]}
-        return tuple(
-            name for name in self.parameters.names if name not in self.zero and name not in dependent
-        )
+        others = {*self.zero, *(name for group in self.equal for name in group[1:])}
+        return tuple(name for name in self.parameters.names if name not in others)
 
     @cached_property
     def free_rows(self) -> NDArray[np.intp]:

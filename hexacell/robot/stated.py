@@ -202,12 +202,10 @@ def stated_effects(
     legs: list[Effect] = []
     if MachinePart.LEGS in known:
         of_legs, of_base = expansion[MachinePart.LEGS], expansion[MachinePart.BASE]
-        coefficients = partial(
-            effect_kinds.expansion_coefficients, legs_um_m_k=of_legs, base_um_m_k=of_base
-        )
+        expanding = partial(effect_kinds.expansion_coefficients, legs_um_m_k=of_legs, base_um_m_k=of_base)
         legs = [
             of("thermometers_k", partial(effect_kinds.thermometers_of_legs, um_per_m_k=of_legs)),
-            of("expansion_percent", coefficients),
+            of("expansion_percent", expanding),
         ]
     scales = effect_kinds.gauge_scales(1e3 * settings.noise.gauge_scale, is_estimated=True)
     yields = stated.leg_compliance_um_n

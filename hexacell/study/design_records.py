@@ -218,9 +218,8 @@ def chosen_orientations(
     records = [_records(belief, pool) for pool in pools]
     places, angle = accurate_at
     task = [_records(belief, _pool(robot, truth, place, angle, 1, random)) for place in places]
-    criterion = Criterion(
-        sum(np.einsum("nij,nik->jk", one.jacobian, one.jacobian) / len(one) for one in task)
-    )
+    squares = (np.einsum("nij,nik->jk", one.jacobian, one.jacobian) / len(one) for one in task)
+    criterion = Criterion(sum(squares))
     taken, covariance = [[0] for _ in pools], belief.covariance
     for _ in range(orientations - 1):
         for rows, some in zip(taken, records, strict=True):

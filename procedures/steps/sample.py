@@ -135,12 +135,11 @@ def require_room(settings: CellSettings, shown_mm: ThreeNumbers, allowed_mm: Arr
             continue
         left = room.upper[axis] if place > 0.0 else -room.lower[axis]
         side = f"{'+' if place > 0.0 else '-'}{gauge.axis}"
-        error = MountingError(
+        problem = (
             f"its plunger stands {abs(place):.1f} mm from the middle of its travel: {max(0.0, left):.1f} "
-            f"mm are left towards {side}, where {needed.upper[axis]:g} are needed",
-            subject=f"gauge {gauge.name}",
-            action=f"Move the gauge by {abs(place):.1f} mm along {side}, or correct its middle_mm",
+            f"mm are left towards {side}, where {needed.upper[axis]:g} are needed"
         )
-        errors.append(error)
+        action = f"Move the gauge by {abs(place):.1f} mm along {side}, or correct its middle_mm"
+        errors.append(MountingError(problem, subject=f"gauge {gauge.name}", action=action))
     if errors:
         raise joined("the gauges must be mounted again", errors)

@@ -17,9 +17,8 @@ from hexacell.storage.output_files import EVENTS, SERVED_CELL
 
 
 def _demo(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
-    parser = add_command(
-        commands, "demo", "do the whole job on a simulated cell, nothing attached", "run.demo"
-    )
+    summary = "do the whole job on a simulated cell, nothing attached"
+    parser = add_command(commands, "demo", summary, "run.demo")
     words = "one of the cells that come with hexacell"
     add_value(parser, "--config", "NAME", words, default="simulated-hexaglide")
     words = "where to work; an earlier demo there is replaced"
@@ -54,9 +53,8 @@ def _tui(commands: Any) -> None:  # noqa: ANN401
 
 
 def _length(commands: Any) -> None:  # noqa: ANN401
-    parser = add_command(
-        commands, "length", "check the scale of the encoders against a known length", "run.length"
-    )
+    summary = "check the scale of the encoders against a known length"
+    parser = add_command(commands, "length", summary, "run.length")
     parser.add_cell()
     parser.add_resume("check")
     add_flag(parser, "--unattended", "no person can mount the gauges")

@@ -79,6 +79,5 @@ def _say(line: bytes) -> None:
     """The one line for who started it, who need not read more."""
     stdout = sys.stdout.fileno()
     os.write(stdout, line)
-    null = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(null, stdout)
-    os.close(null)
+    with Path(os.devnull).open("wb") as null:
+        os.dup2(null.fileno(), stdout)

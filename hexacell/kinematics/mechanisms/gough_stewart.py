@@ -227,5 +227,4 @@ def _unit(vectors: Array) -> tuple[Array, Array]:
 
 
 def _dot(one: Array, other: Array) -> Array:
-    product: Array = np.einsum("...i,...i->...", one, other)[..., None]
-    return product
+    return np.asarray(np.einsum("...i,...i->...", one, other)[..., None])

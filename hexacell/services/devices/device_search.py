@@ -9,14 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from drivers.discovery import USUAL, FoundController, SearchTimeouts, search_controller
-from drivers.discovery.encoders import (
-    BusFindings,
-    FoundNode,
-    search_bus,
-    socketcan_interfaces,
-    speaks_slcan,
-)
+from drivers.discovery import USUAL, FoundController, SearchTimeouts, encoders, search_controller
 from drivers.discovery.gauges import FoundGauge, PortFindings, probe_of, search_port
 from drivers.serial.opening import SerialPortFound, serial_ports
 from hexacell.kinematics.parameters import LEGS, JointUnit
@@ -31,7 +24,7 @@ class SearchFindings:
 
     ports: tuple[SerialPortFound, ...]
     gauges: tuple[PortFindings, ...]
-    buses: tuple[BusFindings, ...]
+    buses: tuple[encoders.BusFindings, ...]
     controller: FoundController | None
     untried: tuple[str, ...] = ()
 
@@ -55,14 +48,18 @@ async def search_devices(
     )
     # CAN buses: of the kernel, behind adapters on ports where no gauge answers, and those named.
     silent = [found.port for found in gauges if not found.gauges and not found.problem]
-    adapters = await asyncio.gather(*(asyncio.to_thread(speaks_slcan, port, timeouts) for port in silent))
+    adapters = await asyncio.gather(
+        *(asyncio.to_thread(encoders.speaks_slcan, port, timeouts) for port in silent)
+    )
     slcan = [port for port, answers in zip(silent, adapters, strict=True) if answers]
     buses: list[dict[str, Any]] = [
-        *({"interface": "socketcan", "channel": name} for name in socketcan_interfaces()),
+        *({"interface": "socketcan", "channel": name} for name in encoders.socketcan_interfaces()),
         *({"interface": "slcan", "channel": port, "bitrate": BITRATE} for port in slcan),
         *named_buses,
     ]
-    searched = await asyncio.gather(*(asyncio.to_thread(search_bus, bus, timeouts) for bus in buses))
+    searched = await asyncio.gather(
+        *(asyncio.to_thread(encoders.search_bus, bus, timeouts) for bus in buses)
+    )
     # Numbers that come unasked are reported in any case, and stream is what describes them.
     untried = tuple(name for name in factories if probe_of(factories[name]) is None and name != "stream")
     return SearchFindings(ports, tuple(gauges), tuple(searched), answering, untried)
@@ -74,16 +71,16 @@ def draft_of(found: SearchFindings, path: Path) -> CellDraft:
     given: dict[str, str] = {}
     for axis, gauge in zip(GAUGE_AXES, gauges, strict=False):
         given |= {f"protocol {axis}": gauge.protocol, f"port {axis}": gauge.port}
-    encoders: Document = {}
+    of_encoders: Document = {}
     if bank := found_bank(found):
         bus, nodes = bank
         words = (bus.bus.get(key) for key in ("interface", "channel", "bitrate"))
         given["bus"] = " ".join(str(word) for word in words if word is not None)
         given["nodes"] = " ".join(str(node.node) for node in nodes)
-        encoders = encoder_keys(nodes)
+        of_encoders = encoder_keys(nodes)
     if found.controller is not None:
         given |= {"host": found.controller.host, "port": str(found.controller.port)}
-    return CellDraft(path, given, tuple(map(gauge_keys, gauges)), encoders)
+    return CellDraft(path, given, tuple(map(gauge_keys, gauges)), of_encoders)
 
 
 def found_gauges(found: SearchFindings) -> tuple[FoundGauge, ...]:
@@ -91,11 +88,11 @@ def found_gauges(found: SearchFindings) -> tuple[FoundGauge, ...]:
     return tuple(gauge for port in found.gauges for gauge in port.gauges)
 
 
-def found_bank(found: SearchFindings) -> tuple[BusFindings, tuple[FoundNode, ...]] | None:
+def found_bank(found: SearchFindings) -> tuple[encoders.BusFindings, tuple[encoders.FoundNode, ...]] | None:
     """The first bus with encoders, and these."""
     for bus in found.buses:
-        if encoders := tuple(node for node in bus.nodes if node.unit is not None):
-            return bus, encoders
+        if nodes := tuple(node for node in bus.nodes if node.unit is not None):
+            return bus, nodes
     return None
 
 
@@ -111,7 +108,7 @@ def gauge_keys(gauge: FoundGauge) -> Document:
     }
 
 
-def encoder_keys(nodes: tuple[FoundNode, ...]) -> Document:
+def encoder_keys(nodes: tuple[encoders.FoundNode, ...]) -> Document:
     """What all six encoders reported beside their ids: what a count is, and their serial numbers."""
     steps = {node.step for node in nodes}
     numbers = [node.serial_number for node in nodes]

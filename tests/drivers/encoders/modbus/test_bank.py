@@ -223,7 +223,7 @@ async def test_what_came_in_place_of_frames_decides_the_advice(simulated, monkey
     monkeypatch.setattr(ModbusScales, "answer", lambda *_: b":010404\r\n")
     monkeypatch.setattr("drivers.serial.modbus_port.TIMES_ASKED", 1)
     with pytest.raises(SilentNodeError, match=r"answers Modbus ASCII.*Set it to Modbus RTU"):
-        await simulated().driver.open()
+        await simulated(timeout_s=0.25).driver.open()
 
 
 async def test_a_busy_device_is_asked_again(simulated, monkeypatch):

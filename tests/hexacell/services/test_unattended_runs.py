@@ -73,7 +73,7 @@ def test_a_disk_that_takes_no_note_changes_nothing_else(refused, monkeypatch) ->
     def full(*_: object) -> None:
         raise errors.FileError("no space left on device")
 
-    monkeypatch.setattr("hexacell.services.unattended.unattended_runs.note_attempt", full)
+    monkeypatch.setattr("hexacell.runs.run_folder.note_attempt", full)
     assert refused() == 1200.0
 
 

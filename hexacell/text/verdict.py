@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from hexacell.checks.change_alarm import ChangeAlarm
 from hexacell.checks.check_result import CheckResult
 from hexacell.kinematics.pose import Pose
-from hexacell.lengths import from_to, shown, unit_of
+from hexacell.lengths import MM, from_to, shown, unit_of
 from hexacell.results.result import ExpectedImprovement, LengthResult
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.text.layout import change_with_sigma, counted, wrapped
@@ -173,12 +173,13 @@ def improvement_sentence(
     """
     if expected is None:
         return ""
+    now = f"{expected.now_mm:.3g} mm" if unit_of(expected.now_mm) is MM else shown(expected.now_mm)
     before, after = "the current config", f"0 +- {shown(expected.expanded_mm)} with this one"
     if verified is not None:
         before, after = "the config before", f"{_with_u(verified.position)} with the new config"
         if verified.alone is not None:
             after = f"{_with_u(verified.alone)} with the best geometry alone, {after}"
-    return f"Largest position error at the task poses: {shown(expected.now_mm)} with {before}, {after}."
+    return f"Largest position error at the task poses: {now} with {before}, {after}."
 
 
 def _with_u(error: JudgedError) -> str:

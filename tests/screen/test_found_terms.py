@@ -70,11 +70,11 @@ def test_what_was_found_is_said_with_its_size_and_what_corrects_it() -> None:
 def test_a_run_says_what_that_gained_and_nothing_where_nothing_was_found(history) -> None:
     said = run_terms_text(fold(told(history)))
     assert said.startswith(found_sentence(FOUND))
-    assert "30.840 mm with the config before, 0.462 +- 0.441 mm with the best geometry alone, 0.0" in said
+    assert "30.8 mm with the config before, 0.462 +- 0.441 mm with the best geometry alone, 0.0" in said
     assert said.endswith(" mm with the new config.")
     assert run_terms_text(fold(history)) == ""
     expected = improvement_sentence(ExpectedImprovement(now_mm=1.2, expanded_mm=0.1))
-    assert expected.endswith("1.200 mm with the current config, 0 +- 0.100 mm with this one.")
+    assert expected.endswith("1.2 mm with the current config, 0 +- 0.100 mm with this one.")
 
 
 def test_who_approves_a_change_is_told_what_its_corrections_are_for(history) -> None:

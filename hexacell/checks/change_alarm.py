@@ -15,7 +15,7 @@ from hexacell.cell.fields import Frozen
 from hexacell.cell.model import CellSettings
 from hexacell.checks.check import Check
 from hexacell.drift.run_evidence import Causes, WhitenedRecords, whiten_records
-from hexacell.drift.single_cause import SingleCauseTest, possible_legs, single_cause_test
+from hexacell.drift.single_cause import SingleCauseTest, possible_groups, single_cause_test
 from hexacell.identification.problem.prior import IdentifiedBefore
 from hexacell.kinematics.mechanism import free_parameter_derivatives
 from hexacell.kinematics.rotations import Array
@@ -72,9 +72,9 @@ def change_alarm(
     check = replace(check, robot=replace(check.robot, expansion=expansion))
     first, _ = _single_causes(check, before, measurements, sound[:FIRST_RECORDS])
     every, legs = _single_causes(check, before, measurements, sound)
-    leg = possible_legs(every.scores, every.sigmas, legs)[0]
+    leg = possible_groups(every.scores, every.sigmas, legs)[0]
     of_leg = np.flatnonzero(legs == leg)
-    cause = possible_legs(every.scores[of_leg], every.sigmas[of_leg], of_leg)[0]
+    cause = possible_groups(every.scores[of_leg], every.sigmas[of_leg], of_leg)[0]
     parameter = check.robot.mechanism.parameters.parameters[cause]
     return ChangeAlarm(
         records=FIRST_RECORDS,

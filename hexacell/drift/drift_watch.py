@@ -20,7 +20,7 @@ import numpy as np
 
 from hexacell.distributions import normal_probability
 from hexacell.drift.run_evidence import CarriedPosterior, Causes, RunEvidence, StepGains, step_gains
-from hexacell.drift.single_cause import possible_legs
+from hexacell.drift.single_cause import possible_groups
 from hexacell.kinematics.rotations import Array
 
 QUIET_RUNS = 3650.0
@@ -176,9 +176,9 @@ class DriftWatch:
     def _likeliest(self, gains: StepGains, place: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """The possible legs of a step at a place, and the possible causes of the likeliest leg."""
         scores, sigmas = np.sqrt(gains.gains[place]), gains.sigmas[place]
-        legs = possible_legs(scores, sigmas, self._causes.legs)
+        legs = possible_groups(scores, sigmas, self._causes.legs)
         of_leg = np.flatnonzero(self._causes.legs == legs[0])
-        return legs, possible_legs(scores[of_leg], sigmas[of_leg], of_leg)
+        return legs, possible_groups(scores[of_leg], sigmas[of_leg], of_leg)
 
 
 def watch_runs(runs: Iterable[RunEvidence], causes: Causes) -> tuple[tuple[StepAlarm, ...], Array]:

@@ -92,19 +92,19 @@ def _largest_by_chance(unit: Array) -> float:
     return float(np.quantile(largest, 1.0 - FALSE_ALARMS))
 
 
-def possible_legs(scores: Array, sigmas: Array, legs: NDArray[np.int_]) -> tuple[int, ...]:
-    """The legs of which one changed, the likeliest first: as few as have ``CERTAIN`` together.
+def possible_groups(scores: Array, sigmas: Array, groups: NDArray[np.int_]) -> tuple[int, ...]:
+    """Groups of causes, such as legs, of which one changed: the likeliest, with ``CERTAIN`` together.
 
     Args:
         scores: (m,) of single causes.
         sigmas: (m,) standard deviations of the estimates of each change.
-        legs: (m,) the leg of each cause; of one leg's causes, the number of each.
+        groups: (m,) the group of each cause.
     """
     with np.errstate(divide="ignore"):
         ratio = (USUAL_CHANGE / sigmas) ** 2
     evidence = 0.5 * (scores**2 * ratio / (1.0 + ratio) - np.log1p(ratio))
-    of_leg = {int(leg): float(np.logaddexp.reduce(evidence[legs == leg])) for leg in np.unique(legs)}
-    ordered = sorted(of_leg, key=of_leg.__getitem__, reverse=True)
-    total = np.logaddexp.reduce(list(of_leg.values()))
-    together = np.cumsum([np.exp(of_leg[leg] - total) for leg in ordered])
+    of_group = {int(one): float(np.logaddexp.reduce(evidence[groups == one])) for one in np.unique(groups)}
+    ordered = sorted(of_group, key=of_group.__getitem__, reverse=True)
+    total = np.logaddexp.reduce(list(of_group.values()))
+    together = np.cumsum([np.exp(of_group[one] - total) for one in ordered])
     return tuple(ordered[: 1 + int(np.searchsorted(together, CERTAIN))])

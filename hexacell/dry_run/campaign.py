@@ -130,6 +130,10 @@ class VirtualCampaign:
         done = self.state.done | {point}
         measured, pilots = self.state.measurements, self.state.pilots
         self.state = decisions.CampaignState(measured, done=done, present=reference, pilots=pilots)
+        self._leave_point()
+
+    def _leave_point(self) -> None:
+        """Let the controller command with the estimate, if that is wanted and safe."""
         plan = self.plan
         is_wanted = plan.settings.identification.provisional and not plan.robot.uses_provisional
         if is_wanted and plan.allows_provisional(self.state):

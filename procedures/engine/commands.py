@@ -217,12 +217,15 @@ class UnattendedOperator:
                 )
             case questions.WrittenResult(line=line):
                 raise AnswerNeeded(f"{line}: a person must decide whether the new geometry stays")
+            case questions.UnreadyController(problem=problem, word=None):
+                raise AnswerNeeded(
+                    f"{problem}, and the run is unattended",
+                    action="Find out why, release it and reset it at the controller, then begin or resume",
+                )
             case questions.UnreadyController(problem=problem, word=word):
                 raise AnswerNeeded(
                     f"{problem}, and the run is unattended",
-                    action="Find out why, release it and reset it at the controller, then begin or resume"
-                    if word is None
-                    else f'Add "{word}" to startup in [controller] if the program may do that by itself, '
+                    action=f'Add "{word}" to startup in [controller] if the program may do that by itself, '
                     "do it at the controller, or run it attended",
                 )
             case questions.StepFailure(problem=problem):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hexacell.drift.drift_watch import DriftWatch, StepAlarm, watch_runs
-from hexacell.drift.single_cause import possible_legs
+from hexacell.drift.single_cause import possible_groups
 from tests.hexacell.drift.synthetic_runs import CAUSES, LEGS, LinearRobot
 
 
@@ -112,14 +112,14 @@ def test_alarms_come_as_the_runs_do() -> None:
 
 def test_the_evidence_of_a_leg_is_that_of_all_its_parameters() -> None:
     sigmas = np.full(6, 0.01)
-    assert possible_legs(np.array([5.0, 0, 0, 0, 0, 0]), sigmas, LEGS)[0] == 1
-    assert possible_legs(np.array([5.0, 0, 4.9, 4.9, 0, 0]), sigmas, LEGS)[0] == 2
+    assert possible_groups(np.array([5.0, 0, 0, 0, 0, 0]), sigmas, LEGS)[0] == 1
+    assert possible_groups(np.array([5.0, 0, 4.9, 4.9, 0, 0]), sigmas, LEGS)[0] == 2
     unseen = np.where(LEGS == 3, np.inf, 0.01)
-    assert possible_legs(np.array([5.0, 0, 0, 0, 0, 9.0]), unseen, LEGS)[0] == 1
+    assert possible_groups(np.array([5.0, 0, 0, 0, 0, 9.0]), unseen, LEGS)[0] == 1
 
 
 def test_as_many_legs_are_named_as_it_may_be() -> None:
     sigmas = np.full(6, 0.01)
-    assert possible_legs(np.array([9.0, 0, 0, 0, 0, 0]), sigmas, LEGS) == (1,)
-    assert possible_legs(np.array([5.0, 0, 4.9, 0, 0, 0]), sigmas, LEGS) == (1, 2)
-    assert possible_legs(np.zeros(6), sigmas, LEGS) == (1, 2, 3)
+    assert possible_groups(np.array([9.0, 0, 0, 0, 0, 0]), sigmas, LEGS) == (1,)
+    assert possible_groups(np.array([5.0, 0, 4.9, 0, 0, 0]), sigmas, LEGS) == (1, 2)
+    assert possible_groups(np.zeros(6), sigmas, LEGS) == (1, 2, 3)

@@ -177,7 +177,7 @@ def explained(error: SilentNodeError, nodes: Sequence[EncoderNode], bus: Encoder
 SDO_REQUEST = 0x600
 SDO_RESPONSE = 0x580
 _SIZE_BITS, _EXPEDITED = 3, 2
-"""Of the first byte of a response: its value is in it, and without the other bit not its size."""
+"""Bits of the first byte of a response: its value is in it; without the other bit its size is not."""
 _UPLOAD_DEVICE_TYPE = bytes((0x40, 0x00, 0x10, 0, 0, 0, 0, 0))
 
 

@@ -23,10 +23,10 @@ from hexacell.kinematics.rotations import Array
 from hexacell.motion.trajectory import interpolate_line
 
 STEP = 1e-4
-"""Of differences, in the joints' unit."""
+"""Step of differences, in the joints' unit."""
 
 ROUNDS = 4
-"""Of Newton's method, for joints a little off the inverse kinematics."""
+"""Steps of Newton's method, for joints a little off the inverse kinematics."""
 
 RESTING = 1e-9
 """What is no motion of a joint, in its unit: the rounding of the inverse kinematics."""

@@ -91,7 +91,7 @@ class ConfigChange(JsonRecord):
         return (self.path, *(one.path for one in self.further))
 
     def to_files(self, paths: Sequence[Path]) -> Self:
-        """The same change of other files, such as those of a machine's folder that was copied."""
+        """This change of other files, such as those of a machine's folder that was copied."""
         files = zip(self.further, paths[1:], strict=False)
         further = tuple(one.model_copy(update={"path": path.absolute()}) for one, path in files)
         return self.model_copy(update={"path": paths[0].absolute(), "further": further})

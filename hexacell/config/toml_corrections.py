@@ -35,7 +35,7 @@ TABLE = "corrections"
 REMARK = "# What the controller adds for what is not geometry: play, backlash, compliance under a weight."
 DECIMALS, DECIMALS_OF_DIRECTION = 6, 9
 MOST_MISTAKES = 20
-"""Of so many the first one is reported."""
+"""Largest number of mistakes that are looked for; the first one is reported."""
 
 
 def _of_unit_length(vector: Three) -> Three:

@@ -78,7 +78,7 @@ class RobotBelief:
         return self.covariance if self.terms is None else self.terms.joint_covariance(self.covariance)
 
     def knowing(self, joint_covariance: Array) -> "RobotBelief":
-        """The same estimate with another covariance of parameters and coefficients."""
+        """This estimate with another covariance of parameters and coefficients."""
         free = len(self.free)
         own, crossed = joint_covariance[:free, :free], joint_covariance[free:, :free]
         known = replace(self, covariance=own)

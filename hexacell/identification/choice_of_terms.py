@@ -28,7 +28,7 @@ ERROR_OF_FIRST_KIND = 0.01
 """Probability that any term is taken of a machine that has none."""
 
 SHARES = (1.0, 0.3, 0.1)
-"""Of a term's stated size: that it has any of these sizes is equally probable beforehand."""
+"""Sizes of a term as shares of the stated one, each equally probable beforehand."""
 
 DISTINCT = log(20.0)
 """Logarithm of the Bayes factor from which two terms are told apart."""

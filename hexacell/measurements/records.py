@@ -20,7 +20,7 @@ Directions = tuple[int, ...]
 """Whether each joint last moved up, 1, or down, -1; 0 where that is not known."""
 
 Temperatures = tuple[float | None, ...]
-"""Of legs 1 to 6 and of the base, deg C; None of what is not known; empty where nothing is."""
+"""Temperatures of legs 1 to 6 and of the base, deg C; None if not known; empty where nothing is."""
 
 MEASURED_PARTS = 7
 

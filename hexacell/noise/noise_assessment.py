@@ -30,7 +30,7 @@ INSTRUMENTS = 9
 """Three gauges and six encoders, which share the significance of one test."""
 
 LEAST_SHARE = 0.3
-"""Of what is stated, from which the readings count beside it: less would make it larger by 5 % at most."""
+"""Share of what is stated from which the readings count too: less makes it larger by 5 % at most."""
 
 WINDOWS = (1, 2, 4, 8, 16)
 """Numbers of windows that are compared."""

@@ -52,7 +52,7 @@ FEWEST = 5.0
 
 NO_RESIDUALS = ChiSquareTest(0.0, 0.0)
 SIZES = np.geomspace(1e-2, 1e3, 400)
-"""Of stops that are tried, as multiples of the noise of the encoders."""
+"""Sizes of stops that are tried, as multiples of the noise of the encoders."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -68,7 +68,7 @@ def worsening_of(changes: Sequence[ReferenceChange], ends: int, noise: Noise) ->
 
 
 def _probability(rows: Array, later: int) -> float:
-    """Of so much more in the ``later`` rows, in units of the noise, by chance."""
+    """Probability of so much more in the ``later`` rows, in units of the noise, by chance."""
     count, size = rows.shape
     moments = rows.T @ rows / count
     trace, squares = float(np.trace(moments)), float(np.sum(moments**2))

@@ -3,7 +3,7 @@
 from hexacell.design.search_effort import USUAL_EFFORT, SearchEffort
 
 EFFORT: SearchEffort = USUAL_EFFORT
-"""Of every search that this program makes; tests of whole runs replace it by a smaller one.
+"""Effort of every search that this program makes; tests of whole runs replace it by a smaller one.
 
 A run, its resumption and its replay decide alike only with the same effort, so it is no option.
 """

@@ -39,7 +39,7 @@ CHOSEN_WITHIN_DEG = 30.0
 
 REPEATABILITIES_MM = (0.002, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
 MEAN_DISTANCE = 4.0 / float(np.sqrt(np.pi))
-"""Of two places that scatter along each axis, in standard deviations: a Maxwell distribution's mean."""
+"""Mean distance of two places that scatter along each axis, in standard deviations (Maxwell)."""
 
 PAPER_REDUCTION = 0.60
 PAPER_REPEATABILITY_MM = 2.0

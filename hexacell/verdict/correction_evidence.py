@@ -13,7 +13,7 @@ from hexacell.robot.model import Robot
 from hexacell.verdict.model_evidence import ModelTest
 
 LEAST_SHARE = 0.5
-"""Of what the config says, below which a controller does not correct."""
+"""Smallest share of what the config says that counts as corrected."""
 
 SHARP = 0.1
 """Standard deviation of that share from which on records tell."""

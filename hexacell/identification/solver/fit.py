@@ -248,7 +248,7 @@ class _Iterate:
         return float(self.elimination.cost(residuals) + from_centre @ self.precision @ from_centre)
 
     def damped(self) -> "_Iterate | Termination":
-        """The same parameters with more damping."""
+        """These parameters with more damping."""
         damping = self.damping * self.growth
         if damping > LARGEST_DAMPING:
             return Termination.STUCK

@@ -69,7 +69,7 @@ class TakenTerms:
         return TakenTerms(self.terms, self.columns[rows], self.offset[rows], self.unknown[rows])
 
     def joined(self, other: TakenTerms) -> TakenTerms:
-        """The same terms at both sets of records."""
+        """These terms at both sets of records."""
         mine = self.columns, self.offset, self.unknown
         others = other.columns, other.offset, other.unknown
         return TakenTerms(self.terms, *map(np.concatenate, zip(mine, others, strict=True)))

@@ -29,7 +29,7 @@ KEPT_SECTIONS = ("robot", "limits", "speed")
 """Sections of the simulated cell in which every answer has a place, and limits are stated with care."""
 GAUGE_AXES = "xyz"
 BITRATE = 500_000
-"""Of a CAN bus whose rate nobody states, bit/s."""
+"""Rate of a CAN bus for which none is stated, bit/s."""
 POINT_OFFSETS = (
     (0.0, 0.0, 0.0),
     (0.0, -1.0, 0.0),

@@ -3,8 +3,9 @@
 One row per record, with the header ``point,orientation,x,y,z,a,b,c,q1,...,q6,dx,dy,dz``: the pose as
 commanded, mm and deg, the joint variables by the encoders, mm or deg as the mechanism has them, and the
 deviation from the point's first row, mm. There may also be ``d1,...,d6``: whether each joint last moved up,
-1, or down, -1; 0 or empty where that is not known; and some of ``t1,...,t6,tb``: the temperatures of
-legs and base, deg C; empty where not known. The order of the columns is free; others are ignored.
+1, or down, -1; 0 or empty where that is not known; some of ``t1,...,t6,tb``: the temperatures of legs and
+base, deg C; and ``time_s``: when the row was measured, s from any moment; both empty where not known. The
+order of the columns is free; others are ignored.
 """
 
 import csv
@@ -31,6 +32,9 @@ DIRECTIONS = ("d1", "d2", "d3", "d4", "d5", "d6")
 TEMPERATURES = ("t1", "t2", "t3", "t4", "t5", "t6", "tb")
 """Columns of a file with records of which it is known how warm legs and base were."""
 
+TIME = "time_s"
+"""Column of a file with records of which it is known when they were measured."""
+
 LARGEST_COUNT = 1_000_000
 MOST_RECORDS = 2000
 """An identification from so many takes a quarter of a minute."""
@@ -52,7 +56,7 @@ def read_measurements(path: Path, *, allow_partial: bool = False) -> Measurement
 
     Raises:
         FileError: the file cannot be read, a column is missing, a cell is not a number, a record occurs
-            twice, or there are too few; with the line.
+            twice, the times of a point go back, or there are too few; with the line.
     """
     text = read_text(path, LARGEST_FILE_BYTES)
     if allow_partial and not text.strip():
@@ -81,15 +85,16 @@ def write_measurements(path: Path, measurements: MeasurementSet) -> None:
     rows = csv.writer(text, lineterminator="\n")
     arrived = DIRECTIONS if any(one.directions for one in measurements.records) else ()
     warm = TEMPERATURES if any(one.temperatures for one in measurements.records) else ()
-    rows.writerow([*HEADER, *arrived, *warm])
+    timed = (TIME,) if any(one.time_s is not None for one in measurements.records) else ()
+    rows.writerow([*HEADER, *arrived, *warm, *timed])
     for one in measurements.records:
         numbers = (*one.pose.as_tuple(), *one.joints, *one.deviation)
         directions = one.directions or ("",) * len(arrived)
-        shown = one.temperatures or (None,) * len(warm)
+        shown = *(one.temperatures or (None,) * len(warm)), *(one.time_s for _ in timed)
         # float(): the repr of a numpy number contains its type.
         cells = (repr(float(number)) for number in numbers)
-        temperatures = ("" if celsius is None else repr(float(celsius)) for celsius in shown)
-        rows.writerow([one.point, one.orientation, *cells, *directions, *temperatures])
+        further = ("" if number is None else repr(float(number)) for number in shown)
+        rows.writerow([one.point, one.orientation, *cells, *directions, *further])
     write_own(path, text.getvalue().encode())
 
 
@@ -100,9 +105,10 @@ def _records(path: Path, text: str, wanted: tuple[str, ...]) -> dict[RecordId, t
     if wanted == HEADER:
         names = {name.strip() for name in header}
         arrived = DIRECTIONS if names.intersection(DIRECTIONS) else ()
-        wanted = (*HEADER, *arrived, *(name for name in TEMPERATURES if name in names))
+        wanted = (*HEADER, *arrived, *(name for name in (*TEMPERATURES, TIME) if name in names))
     columns = _columns(path, line, header, wanted)
     found: dict[RecordId, tuple[int, Record]] = {}
+    latest: dict[int, float] = {}
     for line, row in rows:
         if len(row) != len(header):
             hint = "; is the decimal sign a comma?" if len(row) > len(header) else ""
@@ -115,6 +121,12 @@ def _records(path: Path, text: str, wanted: tuple[str, ...]) -> dict[RecordId, t
             problem = f"{where} is here and in line {other}"
             raise FileError(problem, subject=path, line=line, action="Remove one of the two rows")
         found[record.id] = (line, record)
+        if record.time_s is not None:
+            if record.time_s < (before := latest.get(record.point, record.time_s)):
+                problem = f"{TIME} is {record.time_s:g}, before {before:g} in an earlier row of this point"
+                action = "Put the rows into the order in which they were measured, or correct this cell"
+                raise FileError(problem, subject=path, line=line, action=action)
+            latest[record.point] = record.time_s
         if len(found) > MOST_RECORDS:
             action = "Split the file; some 60 records identify a robot"
             problem = f"there are more than {MOST_RECORDS} records"
@@ -159,7 +171,9 @@ def _record(path: Path, line: int, cells: Mapping[str, str]) -> Record:
     point, orientation = int(numbers[0]), int(numbers[1])
     q1, q2, q3, q4, q5, q6, dx, dy, dz = numbers[8:]
     joints, deviation = (q1, q2, q3, q4, q5, q6), (dx, dy, dz)
-    further = _directions(path, line, cells), _temperatures(path, line, cells)
+    time = cells.get(TIME, "").strip()
+    time_s = _number(path, line, TIME, time) if time else None
+    further = _directions(path, line, cells), _temperatures(path, line, cells), time_s
     return Record(point, orientation, Pose(*numbers[2:8]), joints, deviation, *further)
 
 

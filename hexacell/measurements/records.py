@@ -52,6 +52,7 @@ class Record:
         deviation: of the ball from its position when the gauges were zeroed, along base x, y, z, mm.
         directions: from which side each joint arrived; empty where nothing is known of that.
         temperatures: of legs and base.
+        time_s: when it was read, s from any moment that all records of its point share; None if not known.
     """
 
     point: int
@@ -61,6 +62,7 @@ class Record:
     deviation: Deviation
     directions: Directions = ()
     temperatures: Temperatures = ()
+    time_s: float | None = None
 
     @property
     def id(self) -> RecordId:
@@ -145,6 +147,11 @@ class MeasurementSet:
     def temperatures(self) -> Array:
         """The temperatures of legs and base (n, 7), deg C; NaN where one is not known."""
         return _frozen(temperatures_of(record.temperatures for record in self.records))
+
+    @cached_property
+    def times_s(self) -> Array:
+        """When each record (n,) was read, s; NaN where that is not known."""
+        return _frozen(np.array([record.time_s for record in self.records], dtype=float))
 
 
 def temperatures_of(rows: Iterable[Temperatures]) -> Array:

@@ -20,7 +20,7 @@ import re
 import stat
 import time
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -32,6 +32,7 @@ from pydantic import TypeAdapter, ValidationError
 from hexacell.cell.fields import first_mistake
 from hexacell.errors import CellBusy, FileError, HexacellError, flatten_errors
 from hexacell.storage import atomic_files
+from procedures.run.readings import Reading
 from procedures.steps.events import Event
 
 _log = logging.getLogger(__name__)
@@ -108,7 +109,10 @@ def is_evidence_lost(error: BaseException) -> bool:
 
 
 class Journal(AbstractContextManager["Journal"]):
-    """A journal open for appending; raises ``CellBusy`` if another process writes it, or ``FileError``."""
+    """A journal open for appending; raises ``CellBusy`` if another process writes it, or ``FileError``.
+
+    Its run had taken ``lasted_s`` when it was opened: until its last reading, and as long as that is ago.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -118,7 +122,8 @@ class Journal(AbstractContextManager["Journal"]):
             raise self._cannot_open(error) from error
         try:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            self._events, self._whole = self._read()
+            entries, self._whole = self._read()
+            self._events, self.lasted_s = [entry.event for entry in entries], _lasted_s(entries)
             self._digest, self._times = self._digest_of_file(), self._times_of_file()
         except BlockingIOError:
             os.close(self._descriptor)
@@ -232,13 +237,13 @@ class Journal(AbstractContextManager["Journal"]):
                 action="Use file names that are text in UTF-8",
             ) from error
 
-    def _read(self) -> tuple[list[Event], int]:
+    def _read(self) -> tuple[tuple[Entry, ...], int]:
         with open(self._descriptor, "rb", closefd=False) as stream:
             entries, whole = _parse(self.path, stream)
         if os.fstat(self._descriptor).st_size > whole:
             os.ftruncate(self._descriptor, whole)
         atomic_files.sync_folder(self.path.parent)
-        return [entry.event for entry in entries], whole
+        return entries, whole
 
     def _cut_off(self) -> None:
         """Remove what a failure left of a line, perhaps now that it can be done."""
@@ -247,6 +252,15 @@ class Journal(AbstractContextManager["Journal"]):
 
     def _cannot_open(self, error: OSError) -> FileError:
         return atomic_files.os_error_to_file_error("the journal cannot be opened", self.path, error)
+
+
+def _lasted_s(entries: Sequence[Entry]) -> float:
+    """The time of a run by now, s: by its last reading, and since then by the wall's clock; else 0."""
+    for entry in reversed(entries):
+        reading: Reading | None = getattr(entry.event, "reading", None)
+        if reading is not None and reading.at_s is not None:
+            return reading.at_s + max(0.0, (datetime.now(UTC) - entry.at).total_seconds())
+    return 0.0
 
 
 def _write_whole(descriptor: int, data: bytes) -> None:

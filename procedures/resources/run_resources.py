@@ -45,7 +45,7 @@ class RunResources:
 
     ``require_evidence`` raises ``EvidenceLost`` if the journal is no longer what the run wrote. The
     controller refuses at most ``most_refusals`` poses of one set; then a person is to look at its
-    limits.
+    limits. The run began at ``began_s`` by the clock.
     """
 
     cell: Cell
@@ -56,6 +56,7 @@ class RunResources:
     folder: RunFolder
     thermometers: Thermometers = field(default_factory=Thermometers)
     most_refusals: int = 40
+    began_s: float = 0.0
     require_evidence: Callable[[], None] = lambda: None  # a replay writes no journal
 
     @property
@@ -174,6 +175,7 @@ class RunResources:
         gauges = trimmed_mean(np.concatenate([one.gauges for one in settled]))
         joints = trimmed_mean(np.concatenate([one.joints for one in settled]))
         spreads = np.max([np.ptp(one.gauges, axis=0) for one in settled], axis=0)
+        at_s = round(self.clock.now() - self.began_s, 3)
         temperatures = await self.thermometers.read()
         return Reading(
             gauges_mm=deviation_of(_on_axes(self.devices, gauges)),
@@ -182,6 +184,7 @@ class RunResources:
             temperatures=temperatures,
             part_temperatures=on_parts(self.settings.thermometers, temperatures),
             directions=state.directions,
+            at_s=at_s,
             **_raw([snapshot for one in settled for snapshot in one.window]),
         )
 

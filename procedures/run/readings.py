@@ -37,7 +37,8 @@ class Reading(RawReadings):
 
     ``gauges_mm`` and ``spread_mm`` are mean and range along base x, y, z; ``joints`` are the mean joint
     variables, mm or deg, and ``directions`` those in which each had arrived. ``temperatures`` are those of
-    the cell's thermometers just afterwards, ``part_temperatures`` of legs and base by them.
+    the cell's thermometers just afterwards, ``part_temperatures`` of legs and base by them. ``at_s`` is the
+    time of the run, s, when the window ended; it goes on while the run is interrupted. None in older ones.
     """
 
     gauges_mm: ThreeNumbers
@@ -46,6 +47,7 @@ class Reading(RawReadings):
     temperatures: tuple[Temperature, ...] = ()
     directions: ArrivalDirections = ()
     part_temperatures: Temperatures = ()
+    at_s: float | None = None
 
 
 class ReadingSeries(RawReadings):

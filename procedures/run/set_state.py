@@ -91,6 +91,7 @@ class SetState:
                 deviation=deviation_of(np.subtract(reading.gauges_mm, first.reading.gauges_mm)),
                 directions=reading.directions,
                 temperatures=reading.part_temperatures,
+                time_s=reading.at_s,
             )
             for number, reading in enumerate((*visits, *closing))
         ]

@@ -94,7 +94,7 @@ def record_of(event: EventAtPose, reading: Reading, deviation_mm: Deviation) -> 
     """The record of what was read at a pose."""
     pose, joints = Pose(*event.pose), reading.joints
     point, orientation = event.at.point, event.orientation
-    further = reading.directions, reading.part_temperatures
+    further = reading.directions, reading.part_temperatures, reading.at_s
     return Record(point, orientation, pose, joints, deviation_mm, *further)
 
 

@@ -86,8 +86,8 @@ class Rig:
         self.folder.path.mkdir(exist_ok=True)
         broker = QuestionBroker(self.performer.operator)
         with Journal(self.folder.journal) as journal:
-            evidence = journal.require_read_back
-            performer = replace(self.performer, operator=broker, require_evidence=evidence)
+            evidence, began_s = journal.require_read_back, self.clock.now() - journal.lasted_s
+            performer = replace(self.performer, operator=broker, require_evidence=evidence, began_s=began_s)
             engine = self.engine = Engine(performer, journal, listeners, broker=broker, policy=policy)
             if engine.state.started is None:
                 engine.record(self.started())

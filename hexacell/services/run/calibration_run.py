@@ -175,7 +175,8 @@ async def _run(
     try:
         with Journal(folder.journal) as journal:
             remove_stale_temporaries(folder.path)
-            executor = replace(executor, require_evidence=journal.require_read_back)
+            began_s = connected.clock.now() - journal.lasted_s
+            executor = replace(executor, require_evidence=journal.require_read_back, began_s=began_s)
             engine = Engine(executor, journal, listeners, queue=queue, broker=broker, policy=policy)
             if on_engine is not None:
                 on_engine(engine, connected.devices)

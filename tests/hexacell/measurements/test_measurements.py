@@ -30,9 +30,10 @@ records = st.builds(
     deviation=st.tuples(finite, finite, finite),
     directions=st.just(()) | st.tuples(*[st.sampled_from([1, -1, 0])] * 6),
     temperatures=st.just(()) | st.tuples(*[st.none() | finite] * 7).filter(any),
+    time_s=st.none() | finite,
 )
 measurement_sets = st.lists(records, max_size=8, unique_by=lambda r: (r.point, r.orientation)).map(
-    lambda rows: MeasurementSet(tuple(rows))
+    lambda rows: MeasurementSet(tuple(sorted(rows, key=lambda r: r.time_s or 0.0)))
 )
 
 
@@ -79,6 +80,15 @@ def test_temperatures_are_read_of_the_parts_that_the_file_has(read):
     np.testing.assert_array_equal(found.temperatures[:, 0], [np.nan, np.nan, 0.0, 1.0])
     with pytest.raises(FileError, match='t6 is "warm", but must be a finite number'):
         read("\n".join(lines).replace("-3.25", "warm"))
+
+
+def test_times_are_those_of_a_point_and_do_not_go_back(read):
+    lines = [f"{HEADER},time_s", *(f"{row},{s}" for row, s in zip(ROWS, (90, 3690.5, "", 4), strict=True))]
+    np.testing.assert_array_equal(read("\n".join(lines)).times_s, [90.0, 3690.5, np.nan, 4.0])
+    assert np.isnan(read(GOOD).times_s).all()
+    with pytest.raises(FileError, match="time_s is 80, before 90 in an earlier row of this point") as error:
+        read("\n".join(lines).replace("3690.5", "80"))
+    assert error.value.line == 3
 
 
 def test_header_is_the_documented_one(csv_path):

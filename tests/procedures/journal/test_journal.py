@@ -6,7 +6,7 @@ import json
 import os
 import time
 import zlib
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
@@ -103,6 +103,23 @@ def test_one_writer_at_a_time(path: Path) -> None:
         journal.append(TOLD[1])
     with Journal(path) as journal:
         assert journal.events == TOLD[:2]
+
+
+def test_the_time_of_a_run_goes_on_while_it_is_interrupted(path: Path, monkeypatch) -> None:
+    """From its last reading by the wall's clock, by which nothing goes back if it was set."""
+    reading, written = READING.model_copy(update={"at_s": 200.0}), datetime(2026, 11, 20, 10, tzinfo=UTC)
+    key = SetKey(phase=Phase.IDENTIFY, point=1)
+    with Journal(path) as journal:
+        assert journal.lasted_s == 0.0
+        monkeypatch.setattr(line_format, "now", lambda: (written, 0.0))
+        journal.append(events.ReferenceRepeated(at=key, reading=reading))
+        journal.append(events.Paused(at_once=False))
+    for hours, lasted_s in {1: 3800.0, -1: 200.0}.items():
+        with monkeypatch.context() as patch:
+            patch.setattr(line_format, "datetime", Mock(wraps=datetime))
+            line_format.datetime.now.side_effect = lambda _, h=hours: written + timedelta(hours=h)
+            with Journal(path) as journal:
+                assert journal.lasted_s == lasted_s
 
 
 numbers = st.floats()

@@ -96,12 +96,13 @@ class Allowances:
         return max(stated, room / float(np.linalg.norm(ball.by_joints, axis=0).max()))
 
     def since(
-        self, reference: Pose, before: Array, now: Array, unknown: Array | None = None, readings: int = 0
+        self, reference: Pose, before: Array, now: Array, unknown: Array | None = None, readings: float = 0
     ) -> "ReferenceChange":
         """The change of two readings (9,) at one reference: gauges x, y, z, mm, then the encoders.
 
         ``unknown`` is how far each joint (6,) may be from where it was taken to be in both together. The
-        second one is so many ``readings`` later, between which the gauges drift as is known of them.
+        second one is so many ``readings`` later, or in the time of so many, while the gauges drift as is
+        known of them.
         """
         ball, change = self.ball_at(reference, before[3:]), now - before
         joints, noise = change[3:], self.robot.noise
@@ -189,7 +190,8 @@ class ReferenceChange:
         explicable_mm: (3,) up to which these explain it.
         joints: (6,) of the encoders.
         explicable_joints: up to which the scatter of the stops explains these.
-        readings: how many later the second one is; 0 of visits one after the other.
+        readings: how many later the second one is, or in the mean time of how many, where times are known;
+            0 of visits one after the other.
         by_joints: (3, 6) derivative of the ball's position, mm by the joints' unit.
         chance_joints: (6,) up to which an encoder that did not slip may differ.
         at_rest: (6, 3, 3), mm^2, the ``covariance`` if that leg did not move, whatever its encoder shows.
@@ -202,7 +204,7 @@ class ReferenceChange:
     explicable_mm: Array
     joints: Array
     explicable_joints: float
-    readings: int = 0
+    readings: float = 0
     by_joints: Array = field(default_factory=lambda: np.zeros((3, LEGS)))
     chance_joints: Array = field(default_factory=lambda: np.full(LEGS, np.inf))
     at_rest: Array = field(default_factory=lambda: np.zeros((LEGS, 3, 3)))

@@ -73,8 +73,8 @@ def fit_measurements(
     Args:
         cell: the cell, as :func:`~hexacell.cell.loader.load_cell` gives it.
         measurements: its records, of two poses or more at each point.
-        folder: where the records are kept; if it is that of a run, what commanded them and the noise that
-            it measured come from its journal.
+        folder: where the records are kept; if it is that of a run, what commanded them, and the noise and
+            drift that it measured, come from its journal.
         identify_only: the parameters that are identified, in place of what the cell file states.
 
     Returns:
@@ -90,12 +90,14 @@ def fit_measurements(
     robot, settings, measured = robot_of(cell), cell.settings, None
     if folder is not None and folder.journal.is_file():
         from hexacell.noise.measured_noise import with_measured_noise  # noqa: PLC0415 - only for a run
-        from hexacell.services.history.recorded_cell import commanding_geometries, noise_of_run  # noqa: PLC0415 - likewise
+        from hexacell.services.history.recorded_cell import commanding_geometries, noise_of_run, walk_of_run  # noqa: PLC0415 - likewise
 
         robot = replace(robot, earlier=(*commanding_geometries(folder, cell.settings), *robot.earlier))
         if (measured := noise_of_run(folder, cell.settings)) is not None:
             settings = with_measured_noise(settings, measured)
             robot = robot.with_errors_of(settings)
+        walk_mm, walk_s = walk_of_run(folder, settings)
+        robot = replace(robot, noise=replace(robot.noise, walk_mm=walk_mm, walk_s=walk_s))
     known = known_parts(one.temperatures for one in measurements.records)
     robot = replace(robot, effects=stated_effects(settings, known=known))
     if identify_only is not None:

@@ -89,6 +89,7 @@ class Calibration:
             None if proposed is None else proposed.corrections,
             state.committed is not None,
             state.walk_mm,
+            state.walk_s,
         )
 
     @cached_property
@@ -141,7 +142,7 @@ class Knowledge:
             mechanism's frame convention; ``is_lent``: it has it now.
         written: parameters of the proposed geometry, in the controller's frames, with the ``corrections``
             that are proposed beside it; ``is_committed``: the controller has it.
-        walk_mm: how far the gauges drift from one reading to the next.
+        walk_mm: how far the gauges drift from one reading to the next; ``walk_s``: in what time, if known.
     """
 
     calibration: Calibration
@@ -153,6 +154,7 @@ class Knowledge:
     corrections: Corrections | None = None
     is_committed: bool = False
     walk_mm: float = 0.0
+    walk_s: float = 0.0
 
     @cached_property
     def settings(self) -> CellSettings:
@@ -165,7 +167,7 @@ class Knowledge:
         """The robot as its controller commanded it at the start, with the measured noise."""
         robot = replace(self.calibration.robot, refused=self.refused)
         robot = robot if self.noise is None else robot.with_errors_of(self.settings)
-        return replace(robot, noise=replace(robot.noise, walk_mm=self.walk_mm))
+        return self._drifting(robot)
 
     @cached_property
     def plan(self) -> Plan:
@@ -258,7 +260,7 @@ class Knowledge:
         """
         noise, settings = self.noise, self.settings
         if noise is not None and found is not None:
-            noise = noise_again(self.calibration.plan, state, found, self.walk_mm) or noise
+            noise = noise_again(self.calibration.plan, state, found, self.walk_mm, self.walk_s) or noise
             settings = with_measured_noise(self.calibration.settings, noise)
             robot = replace(robot, noise=noise_of(settings))
         robot = replace(robot, expansion=robot.expansion.referred_to(state.measurements()))
@@ -268,11 +270,14 @@ class Knowledge:
         robot = self._at_temperatures(robot, settings, state.temperature_range_k(on_legs), known)
         if noise is None:
             return robot
-        robot = replace(robot, noise=replace(robot.noise, walk_mm=self.walk_mm))
+        robot = self._drifting(robot)
         identifying = replace(self.identifying.robot, noise=robot.noise)
         allowances = Allowances(self.calibration.settings, identifying, is_measured=True, found=found)
         changes = repeated_readings(state, self.calibration.plan, allowances)
         return Repeats.of(noise.approaches, [*changes], robot.noise, found).applied_to_robot(robot)
+
+    def _drifting(self, robot: Robot) -> Robot:
+        return replace(robot, noise=replace(robot.noise, walk_mm=self.walk_mm, walk_s=self.walk_s))
 
     def provisional_geometry(self, state: RunState) -> Geometry:
         """The estimate by now, or the provisional geometry that the run applied before an interruption.

@@ -86,7 +86,15 @@ def since_zero(allowances: Allowances, measured: SetState, now: Reading) -> Refe
     reference = Pose(*zero.pose)
     before, after = (_gauges_and_joints(one, reference, allowances) for one in (zero.reading, now))
     unknown = _on_unknown_sides(zero.reading, allowances) + _on_unknown_sides(now, allowances)
-    return allowances.since(reference, before, after, unknown, measured.readings)
+    readings = readings_between(zero.reading, now, measured.readings, allowances.robot.noise.walk_s)
+    return allowances.since(reference, before, after, unknown, readings)
+
+
+def readings_between(before: Reading, after: Reading, counted: float, walk_s: float) -> float:
+    """How many readings later one was taken, or in the mean time ``walk_s`` of how many, if it is known."""
+    if walk_s <= 0.0 or before.at_s is None or after.at_s is None:
+        return counted
+    return max(0.0, after.at_s - before.at_s) / walk_s
 
 
 def _on_unknown_sides(reading: Reading, allowances: Allowances) -> Array:
@@ -112,22 +120,35 @@ def repeated_readings(state: RunState, plan: Plan, allowances: Allowances) -> It
             yield since_zero(allowances, one, one.closing)
 
 
-def drift_by_repeats(plan: Plan, state: RunState, allowances: Allowances) -> float:
-    """How far the gauges drift from one reading to the next, mm (1 sigma); 0 unless significant.
+def drift_by_repeats(plan: Plan, state: RunState, allowances: Allowances) -> tuple[float, float]:
+    """How far the gauges drift from one reading to the next, mm (1 sigma), and in what time, s, if known.
 
-    What was measured of the noise contains the drift between the visits: what is stated does not.
+    Both are 0 unless it is significant. What was measured of the noise contains the drift between the
+    visits: what is stated does not.
     """
+    walk_s = _mean_interval_s(state)
     measured, stated = (
-        replace(allowances, robot=replace(allowances.robot, noise=replace(noise, walk_mm=0.0)))
+        replace(
+            allowances, robot=replace(allowances.robot, noise=replace(noise, walk_mm=0.0, walk_s=walk_s))
+        )
         for noise in (allowances.robot.noise, plan.robot.noise)
     )
     if not Repeats(tuple(repeated_readings(state, plan, measured))).show_drift(measured.robot.noise):
-        return 0.0
-    return Repeats(tuple(repeated_readings(state, plan, stated))).drift_mm
+        return 0.0, 0.0
+    return Repeats(tuple(repeated_readings(state, plan, stated))).drift_mm, walk_s
+
+
+def _mean_interval_s(state: RunState) -> float:
+    """The mean time from one reading of a set to the next, to their ends; 0 where one is not known."""
+    sets = [one for key, one in state.sets.items() if key.phase is Phase.IDENTIFY and one.samples]
+    ends = [(one.samples[0].reading.at_s, one.closing.at_s, one.readings) for one in sets if one.closing]
+    first_s, last_s, readings = np.array(ends, dtype=float).reshape(-1, 3).T
+    took_s = float(np.sum(last_s - first_s))
+    return took_s / float(np.sum(readings)) if took_s > 0.0 else 0.0
 
 
 def noise_again(
-    plan: Plan, state: RunState, found: Identification, walk_mm: float = 0.0
+    plan: Plan, state: RunState, found: Identification, walk_mm: float = 0.0, walk_s: float = 0.0
 ) -> MeasuredNoise | None:
     """The measured noise by the visits, with the geometry that was identified; None without."""
     allowances = Allowances(plan.settings, plan.robot, is_measured=True, found=found)
@@ -135,7 +156,10 @@ def noise_again(
         return None
     visited = state.set(state.noise.at)
     # A random walk of n steps varies about its mean by a sixth of n.
-    steps = (len(visited.visits) + len(visited.pilots)) / 6.0
+    counted = len(visited.visits) + len(visited.pilots)
+    every = [one.reading for one in (*visited.samples[:1], *visited.visits)]
+    first, *_, last = sorted(every, key=lambda one: one.at_s or 0.0)
+    steps = readings_between(first, last, counted, walk_s) / 6.0
     return assess_again(plan, visits, state.noise.noise, found, walk_mm * float(np.sqrt(steps)))
 
 

@@ -29,7 +29,8 @@ class SetState:
         samples: those that count, in the order taken; the first is the reference.
         again: orientations and poses of discarded records, which are taken again.
         closing: what was read at the reference at the end.
-        walk_mm: how far the gauges drift from one reading to the next, by all sets until then.
+        walk_mm: how far the gauges drift from one reading to the next, by all sets until then; ``walk_s``:
+            in what time, if it is known.
         reference_unverified: the gauges were unwatched; their zero must be verified at the reference.
         standstill: readings at the reference without moving, and ``visits`` of it.
         has_left: the robot has been elsewhere since it was read last.
@@ -45,6 +46,7 @@ class SetState:
     drift_mm: tuple[float, float, float] | None = None
     closing: Reading | None = None
     walk_mm: float = 0.0
+    walk_s: float = 0.0
     again: tuple[tuple[int, SixNumbers], ...] = ()
     reference_unverified: bool = False
     standstill: StandstillRead | None = None

@@ -193,9 +193,18 @@ class RunState:
     @property
     def walk_mm(self) -> float:
         """How far the gauges drift from one reading to the next, mm (1 sigma); 0 unless significant."""
+        return self._last_closed.walk_mm
+
+    @property
+    def walk_s(self) -> float:
+        """The mean time from one reading to the next, s, by which that drift goes; 0: by their number."""
+        return self._last_closed.walk_s
+
+    @property
+    def _last_closed(self) -> SetState:
         sets = self.sets.items()
-        closed = [one.walk_mm for key, one in sets if key.phase is Phase.IDENTIFY and one.closed]
-        return closed[-1] if closed else 0.0
+        closed = [one for key, one in sets if key.phase is Phase.IDENTIFY and one.closed]
+        return closed[-1] if closed else SetState()
 
     def _visits_of(self, key: SetKey) -> tuple[Reading, ...]:
         """The visits of a set's reference after its first record, if that was not taken again then."""

@@ -27,6 +27,7 @@ class SetClosed(EventOfSet):
     ``drift_mm`` is the change of the gauges since they were zeroed, less what the encoders explain. The
     ``reason`` is why the set has fewer records than planned; empty where it has all. ``walk_mm`` is how far
     the gauges drift from one reading to the next (1 sigma), by the ends of all sets; 0 unless significant.
+    ``walk_s`` is the mean time between these, by which the drift goes; 0: by their number.
     """
 
     kind: Literal["closed"] = "closed"
@@ -34,10 +35,11 @@ class SetClosed(EventOfSet):
     reading: Reading
     reason: str = ""
     walk_mm: float = 0.0
+    walk_s: float = 0.0
 
     def applied_to(self, state: RunState) -> RunState:
-        read = {"drift_mm": self.drift_mm, "closing": self.reading, "walk_mm": self.walk_mm}
-        return state.with_changed_set(self.at, **read)
+        walk = {"walk_mm": self.walk_mm, "walk_s": self.walk_s}
+        return state.with_changed_set(self.at, drift_mm=self.drift_mm, closing=self.reading, **walk)
 
     def text(self, state: RunState) -> str:
         samples = state.set(self.at).samples
@@ -75,11 +77,11 @@ class CloseSet(StepOfSet):
             raise trip.as_error()  # not latched, as nothing moved
         drift_mm = deviation_of(change.unexplained_mm)
         closed = SetClosed(at=self.at, drift_mm=drift_mm, reading=reading, reason=self.reason)
-        walk_mm = state.walk_mm
+        walk = state.walk_mm, state.walk_s
         if self.at.phase is Phase.IDENTIFY:
             after, known = closed.applied_to(state), run.calibration.known(state)
-            walk_mm = drift_by_repeats(run.calibration.plan, after, known.allowances)
-        return closed.model_copy(update={"walk_mm": walk_mm})
+            walk = drift_by_repeats(run.calibration.plan, after, known.allowances)
+        return closed.model_copy(update=dict(zip(("walk_mm", "walk_s"), walk, strict=True)))
 
 
 def reference_drift(point: str, change: ReferenceChange, limit_mm: float) -> Trip | None:

@@ -36,6 +36,7 @@ class Noise:
             it moves the ball.
         walk_mm: of what the gauges' zero drifts along each axis from one reading at a point to the next;
             zero unless the references that were read again show it.
+        walk_s: the mean time from one to the next, s, by which it goes; zero: it goes by their number.
         freedom: degrees of freedom with which all this was measured; infinite where it is stated.
         gauge_axes: rows of the matrix whose columns are the gauges' directions in the frame convention;
             empty where all gauges are alike, or along its axes.
@@ -50,6 +51,7 @@ class Noise:
     gauge_axes: tuple[tuple[float, ...], ...] = ()
     stops: float = 0.0
     walk_mm: float = 0.0
+    walk_s: float = 0.0
     freedom: float = np.inf
 
     def with_devices(self, encoders: Sequence[float], gauges_mm: Sequence[float]) -> Noise:

@@ -51,6 +51,7 @@ class Problem:
         warmer: (n, 7), K, by how much legs and base were warmer than that.
         holds_at: the temperatures of the geometry.
         deviations: (n, 3), mm, in the convention's base frame.
+        times_s: (n,) when each was read; NaN where that is not known.
         directions: (n, 6) from which side each joint arrived, 1 or -1; 0 where that is not known.
         first_rows: (m,) row at which each point begins.
         initial_parameters: free parameters (p,), mm, at which the solver starts: those of the last
@@ -75,6 +76,7 @@ class Problem:
     noise: Noise
     joints: Array
     deviations: Array
+    times_s: Array
     directions: Array
     warmer: Array
     holds_at: Temperatures
@@ -217,6 +219,7 @@ class Problem:
             self,
             joints=self.joints[kept],
             deviations=self.deviations[kept],
+            times_s=self.times_s[kept],
             directions=self.directions[kept],
             warmer=self.warmer[kept],
             first_rows=first_rows_of(self.labels[kept, 0]),
@@ -241,6 +244,7 @@ class Problem:
             self,
             joints=np.concatenate([self.joints, other.joints])[order],
             deviations=np.concatenate([self.deviations, other.deviations])[order],
+            times_s=np.concatenate([self.times_s, other.times_s])[order],
             directions=np.concatenate([self.directions, other.directions])[order],
             warmer=np.concatenate([self.warmer, other.warmer])[order],
             first_rows=first_rows_of(labels[order, 0]),
@@ -333,6 +337,7 @@ class Assumptions:
             noise=self.noise.along(frames.base),
             joints=joints,
             deviations=deviations,
+            times_s=measurements.times_s[order],
             directions=measurements.directions[order],
             warmer=warmer,
             holds_at=self.expansion.holds_at(measurements),

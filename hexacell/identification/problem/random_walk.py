@@ -4,7 +4,8 @@ The gauges' mounts, the frame and temperature move the zero of the gauges by ``d
 record k - 1 to record k of a point, so that record k is off by ``d_1 + ... + d_k``. With the increments as
 unknowns that have this prior, records have exactly the covariance ``s^2 min(j, k) I`` of a random walk. A
 reading of the reference is a record as any other. Where one begins and one ends the records of a point,
-what remains between them is a Brownian bridge about the straight line from one to the other.
+what remains between them is a Brownian bridge about the straight line from one to the other. Where the
+times of all records are known, an increment is by the time that has passed: after a pause it is larger.
 
 Source: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, appendix B.2.1.
 """
@@ -18,13 +19,17 @@ TRIAL = 4
 """Steps from a reference to its next record: in between the gauges are tried by three readings."""
 
 
-def walk_columns(first_rows: NDArray[np.intp], records: int, step_mm: float) -> Array:
+def walk_columns(
+    first_rows: NDArray[np.intp], records: int, step_mm: float, times: Array | None = None
+) -> Array:
     """What one standard deviation of each increment does to each record.
 
     Args:
         first_rows: (m,) row at which each point begins, of records in the order in which they were taken.
         records: their number n.
         step_mm: one standard deviation along each axis from one reading to the next.
+        times: (n,) when records were taken, in the mean time from one reading to the next; None, or NaN
+            where one is not known: steps are counted.
 
     Returns:
         (n, 3, 3 (n - m)), mm.
@@ -33,6 +38,8 @@ def walk_columns(first_rows: NDArray[np.intp], records: int, step_mm: float) -> 
     later = np.setdiff1d(rows, first_rows)
     point = np.searchsorted(first_rows, rows, side="right")
     is_moved = (point[:, None] == point[later]) & (rows[:, None] >= later)
-    steps = step_mm * np.sqrt(np.where(np.isin(later - 1, first_rows), TRIAL, 1))
-    columns: Array = (steps * is_moved)[:, None, :, None] * np.eye(3)[:, None, :]
+    steps = np.where(np.isin(later - 1, first_rows), TRIAL, 1.0)
+    if times is not None and np.isfinite(times).all():
+        steps = np.maximum(times[later] - times[later - 1], 0.0)
+    columns: Array = (step_mm * np.sqrt(steps) * is_moved)[:, None, :, None] * np.eye(3)[:, None, :]
     return columns.reshape(records, 3, 3 * len(later))

@@ -175,7 +175,8 @@ class NuisanceElimination:
             designs.append(-problem.gauges * (problem.deviations @ problem.gauges)[:, None, :])
             self._sigmas = np.full(3, noise.gauge_scale)
         if noise.walk_mm > 0.0 and problem.records > problem.points:
-            designs.append(walk_columns(problem.first_rows, problem.records, noise.walk_mm))
+            times = problem.times_s / noise.walk_s if noise.walk_s > 0.0 else None
+            designs.append(walk_columns(problem.first_rows, problem.records, noise.walk_mm, times))
         if problem.terms is not None:
             designs.append(-problem.terms.columns)
         if designs:

@@ -61,6 +61,12 @@ def noise_of_run(folder: RunFolder, settings: CellSettings) -> MeasuredNoise | N
     return None if measured is None else measured.noise
 
 
+def walk_of_run(folder: RunFolder, settings: CellSettings) -> tuple[float, float]:
+    """How far the gauges of a run drifted from one reading to the next, mm, and in what time, s; else 0."""
+    state = _state_of(folder, settings)
+    return state.walk_mm, state.walk_s
+
+
 def commanding_geometries(folder: RunFolder, settings: CellSettings) -> tuple[CommandingGeometry, ...]:
     """The geometries that commanded a run: its controller's, and a provisional one in the same frames.
 

@@ -24,6 +24,7 @@ from hexacell.services.offline import fit_measurements
 from hexacell.text.identification import identification_report
 from procedures.run.keys import Phase, SetKey
 from procedures.steps import events
+from tests.procedures.story import READING
 from tests.recorded_events import record
 
 ON_FLOOR = FrameTransform(
@@ -91,13 +92,18 @@ def measured_noise(*gauges_mm: float) -> events.NoiseMeasured:
 
 def test_records_in_a_run_folder_are_weighted_by_the_noise_that_the_run_measured(tmp_path, paper, visit):
     cell, measured = load_cell(bundled_config("simulated-hexaglide")), visit(seed=2).measured(0.01, seed=1)
-    run = run_of(tmp_path, started(paper.nominal, paper), measured_noise(0.01, 0.04, 0.01))
+    key, drift = SetKey(phase=Phase.IDENTIFY, point=1), {"walk_mm": 0.002, "walk_s": 20.0}
+    reading = READING.model_copy(update={"counts": ((0,) * 6,)})
+    closed = events.SetClosed(at=key, drift_mm=(0.0,) * 3, reading=reading, **drift)
+    run = run_of(tmp_path, started(paper.nominal, paper), measured_noise(0.01, 0.04, 0.01), closed)
     told = noise_of_run(run, cell.settings)
     assert told is not None
     assessed = fit_measurements(cell, measured, run)
     assert assessed.measured_noise == told
     assert "noise                    gauges 10 to 40, encoders 10 um" in identification_report(assessed)
-    assert assessed.found.problem.noise.gauges_mm == pytest.approx([0.01, 0.04, 0.01])
+    counted = assessed.found.problem.noise
+    assert counted.gauges_mm == pytest.approx([0.01, 0.04, 0.01])
+    assert (counted.walk_mm, counted.walk_s) == (0.002, 20.0), "the drift that it found"
     alone = fit_measurements(cell, measured)
     assert alone.measured_noise is None
     assert "noise                    gauges" not in identification_report(alone)

@@ -62,6 +62,21 @@ def test_a_reference_reached_from_another_side_is_no_slipped_gauge(allowances: A
     assert since_zero(allowances, at_zero, slipped).exceeds(0.1)
 
 
+def test_a_drift_goes_by_the_time_of_the_readings_as_far_as_it_is_known(allowances: Allowances) -> None:
+    noise = replace(allowances.robot.noise, walk_mm=0.01, walk_s=30.0)
+    drifting = replace(allowances, robot=replace(allowances.robot, noise=noise))
+    zero, now = (reading(np.zeros(3), np.zeros(6), FROM_BELOW) for _ in range(2))
+    pose = allowances.settings.identification.points[0]
+
+    def readings(began_s: float | None, walking: Allowances = drifting) -> float:
+        taken = SimpleNamespace(reading=zero.model_copy(update={"at_s": began_s}), pose=pose)
+        at_zero = SetState((taken,) * 11)  # type: ignore[arg-type]
+        return since_zero(walking, at_zero, now.model_copy(update={"at_s": 4000.0})).readings
+
+    assert [readings(3670.0), readings(400.0), readings(None)] == [11.0, 120.0, 11]
+    assert readings(400.0, allowances) == 11, "an older run has found how far it drifts a reading"
+
+
 def test_few_visits_leave_room_for_a_larger_scatter(allowances: Allowances) -> None:
     scattering = replace(allowances.robot, noise=replace(allowances.robot.noise, stops=0.3))
     measured = replace(allowances, robot=scattering)

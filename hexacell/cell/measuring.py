@@ -226,8 +226,12 @@ class NoiseSettings(Section):
         ge=0,
         le=MOST_REVISITS,
     )
-    averaged_windows: int = key(
-        1, "most settled windows that a record may be the mean of, where that pays", ge=1, le=16
+    averaged_windows: int | None = key(
+        None,
+        "most settled windows that a record may be the mean of, where that pays; by default up to 4, where "
+        "acceptance.position_mm or identification.target_mm needs it",
+        ge=1,
+        le=16,
     )
 
     def gauge_at(self, index: int) -> float:

@@ -71,14 +71,15 @@ def with_measured_noise(settings: CellSettings, measured: MeasuredNoise) -> Cell
     if approaches is not None:  # as measured, unless more is stated and holds
         stops = approaches.stops if stated.figures == "measured" else max(stops, approaches.stops)
     noise = stated.model_copy(update={"gauges_mm": gauges, "encoders": encoders, "stops": stops})
-    seconds = TimeModel.of(settings).record_seconds + averaging_seconds(settings, measured.windows)
-    return settings.model_copy(
-        update={
-            "noise": noise,
-            "uncertainty": _stated_effects(settings, measured),
-            "identification": settings.identification.model_copy(update={"seconds_per_record": seconds}),
-        }
-    )
+    update = {"noise": noise, "uncertainty": _stated_effects(settings, measured)}
+    return with_windows(settings, measured.windows).model_copy(update=update)
+
+
+def with_windows(settings: CellSettings, windows: int) -> CellSettings:
+    """The settings of a cell whose records take the time of some windows."""
+    seconds = TimeModel.of(settings).record_seconds + averaging_seconds(settings, windows)
+    planned = settings.identification.model_copy(update={"seconds_per_record": seconds})
+    return settings.model_copy(update={"identification": planned})
 
 
 def averaging_seconds(settings: CellSettings, windows: int) -> float:

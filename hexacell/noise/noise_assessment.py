@@ -14,8 +14,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from hexacell.campaign.budget import Budget
 from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.planner import Plan
+from hexacell.cell.model import CellSettings
 from hexacell.identification.problem.prior import Noise
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.parameters import JointUnit
@@ -25,6 +27,7 @@ from hexacell.noise import measured_noise
 from hexacell.noise.approach_scatter import RepeatedApproaches, ScatterSource, approach_scatter
 from hexacell.noise.ball_by_encoders import BallByEncoders
 from hexacell.noise.standstill import SIGNIFICANCE, ReadingNoise, reading_noise
+from hexacell.uncertainty.statement import COVERAGE_FACTOR
 
 INSTRUMENTS = 9
 """Three gauges and six encoders, which share the significance of one test."""
@@ -36,6 +39,11 @@ WINDOWS = (1, 2, 4, 8, 16)
 """Numbers of windows that are compared."""
 WORTHWHILE = 0.9
 """A larger number is taken if the predicted error is at most such a share of that with half as many."""
+MOST_UNASKED = 4
+"""Windows that a run takes at most where the cell file states no number."""
+NEAR_LIMIT = 0.5
+"""Share of the limit within which U by the noise, with the guard band, needs no more windows unasked: the
+rest is for the error itself and the systematic effects."""
 PERFECT = 1e-3
 """Share of the noise of encoders that count as perfect."""
 
@@ -67,7 +75,7 @@ def assess_noise(plan: Plan, readings: NoiseReadings) -> measured_noise.Measured
     }
     forecaster = AveragingForecaster(plan)
     forecasts = forecaster.forecasts(noise)
-    windows = worthwhile_windows(forecasts, plan.settings.noise.averaged_windows)
+    windows = _windows_taken(plan, forecasts)
     x, y, z, *encoders = assessment.instruments(windows)
     return measured_noise.MeasuredNoise(
         gauges=(x, y, z),
@@ -197,7 +205,7 @@ class AveragingForecaster:
 
     def forecasts(self, noise: Mapping[int, Noise]) -> tuple[measured_noise.AveragingForecast, ...]:
         """Errors by the noise of records of some windows each; empty where no accuracy is predicted."""
-        errors = {windows: self.end_error(one) for windows, one in noise.items()}
+        errors = {windows: self.end_error(one, windows) for windows, one in noise.items()}
         records = sum(self.plan.forecaster.planned(CampaignState()).values())
         minutes = {
             windows: records * measured_noise.averaging_seconds(self.plan.settings, windows) / 60.0
@@ -215,11 +223,16 @@ class AveragingForecaster:
         error, other = self.end_error(noise), self.end_error(perfect)
         return None if error is None or other is None else max(error**2 - other**2, 0.0) ** 0.5
 
-    def end_error(self, noise: Noise) -> float | None:
-        """The predicted error at the worst task pose once all is measured, one standard deviation, mm."""
+    def end_error(self, noise: Noise, windows: int = 1) -> float | None:
+        """The predicted error at the worst task pose once all is measured, one standard deviation, mm.
+
+        Records of more windows take longer: a budget in minutes pays for fewer.
+        """
+        budget = Budget.of(measured_noise.with_windows(self.plan.settings, windows))
+        forecaster = replace(self.plan.forecaster, budget=budget)
         belief = replace(self.plan.robot.belief(), noise=noise)
-        after = self.plan.forecaster.predicted_belief(belief, CampaignState())
-        return self.plan.forecaster.worst_error(CampaignState(), after)
+        after = forecaster.predicted_belief(belief, CampaignState())
+        return forecaster.worst_error(CampaignState(), after)
 
 
 def mean_of_independent(noise: Noise, windows: int) -> Noise:
@@ -227,11 +240,36 @@ def mean_of_independent(noise: Noise, windows: int) -> Noise:
     return replace(noise, encoder=noise.encoder / windows**0.5, gauge_mm=noise.gauge_mm / windows**0.5)
 
 
-def worthwhile_windows(forecasts: tuple[measured_noise.AveragingForecast, ...], most: int) -> int:
-    """How many windows to average: as many as pay, each number against the one before it."""
+def worthwhile_windows(
+    forecasts: tuple[measured_noise.AveragingForecast, ...], most: int, enough_mm: float = 0.0
+) -> int:
+    """How many windows to average: as many as pay, each number against the one before it.
+
+    No more are taken once the error is ``enough_mm``.
+    """
     best = 1
     for fewer, more in pairwise(forecasts):
-        if more.windows > most or more.error_mm > WORTHWHILE * fewer.error_mm:
+        pays = more.error_mm <= WORTHWHILE * fewer.error_mm and fewer.error_mm > enough_mm
+        if more.windows > most or not pays:
             break
         best = more.windows
     return best
+
+
+def _windows_taken(plan: Plan, forecasts: tuple[measured_noise.AveragingForecast, ...]) -> int:
+    """How many windows each record of a run is the mean of.
+
+    What a goal other than the geometry needs, no error at the task poses says.
+    """
+    stated = plan.settings.noise.averaged_windows
+    if stated is not None or plan.goal is not None:
+        return worthwhile_windows(forecasts, stated or 1)
+    return worthwhile_windows(forecasts, MOST_UNASKED, _enough_mm(plan.settings))
+
+
+def _enough_mm(settings: CellSettings) -> float:
+    """The error at the task poses, one standard deviation, mm, less than which nobody asked for."""
+    limits, target = settings.acceptance, settings.identification.target_mm
+    if target is not None:
+        return target
+    return NEAR_LIMIT * limits.position_mm / (limits.guard_band_factor * COVERAGE_FACTOR)

@@ -151,7 +151,10 @@ def _averaging(measured: MeasuredNoise) -> Iterator[str]:
     possible = worthwhile_windows(measured.forecasts, max(by_windows))
     if chosen > 1:
         gain = _gain(by_windows[chosen])
-        yield f"  a record is the mean of {chosen} windows of readings, which gives {gain}"
+        yield (
+            f"  a record is the mean of {chosen} windows of readings, which gives {gain}; "
+            "averaged_windows = 1 in [noise] does without"
+        )
     if possible > chosen:
         yield (
             f"  {possible} windows of readings a record would give {_gain(by_windows[possible])}: "

@@ -35,9 +35,13 @@ def plan(bundled_cell) -> Plan:
 
 
 def allowing(plan: Plan, **noise: Any) -> Plan:
-    """The plan with other settings in [noise]; sets of poses that were planned before are kept."""
-    settings = changed(plan.settings, {f"noise.{key}": value for key, value in noise.items()})
-    other = replace(plan, settings=settings)
+    """The plan with other settings in [noise]."""
+    return with_changes(plan, {f"noise.{key}": value for key, value in noise.items()})
+
+
+def with_changes(plan: Plan, changes: dict[str, Any]) -> Plan:
+    """The plan with other settings; sets of poses that were planned before are kept."""
+    other = replace(plan, settings=changed(plan.settings, changes))
     other.__dict__["planned_sets"] = plan.planned_sets
     return other
 
@@ -147,12 +151,22 @@ def test_longer_readings_help_against_noise_from_reading_to_reading_alone(plan) 
     assert records_of(from_readings) == pytest.approx(np.full(9, expected), rel=0.1)
 
 
-def test_longer_readings_are_not_taken_where_the_cell_file_does_not_allow_them(plan) -> None:
-    measured = assess_noise(plan, readings(plan, white=np.sqrt(WINDOW) * STATED))
-    assert measured.windows == 1
-    first, second = measured.forecasts[:2]
-    assert second.error_mm < 0.9 * first.error_mm
-    assert second.minutes == pytest.approx(55 * 0.6 / 60.0)
+@pytest.mark.parametrize(
+    ("changes", "windows"),
+    [
+        ({"noise.averaged_windows": 1}, 1),
+        ({"acceptance.position_mm": 0.2}, 4),
+        ({"acceptance.position_mm": 2.0}, 1),
+        ({"identification.target_mm": 0.02}, 4),
+        ({"identification.target_mm": 0.3, "acceptance.position_mm": 0.2}, 1),
+        ({"identification.budget_minutes": 2.5, "acceptance.position_mm": 0.2}, 1),
+    ],
+)
+def test_longer_readings_are_taken_unasked_where_the_accuracy_is_needed(plan, changes, windows) -> None:
+    """A budget in minutes that is used up by one window a record pays for fewer records of several."""
+    white = 3.0 * np.sqrt(WINDOW) * STATED
+    measured = assess_noise(with_changes(plan, changes), readings(plan, white=white))
+    assert measured.windows == windows
 
 
 def test_without_a_series_or_visits_what_is_stated_holds(plan) -> None:

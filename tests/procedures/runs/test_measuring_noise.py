@@ -171,7 +171,7 @@ async def test_encoders_that_show_other_places_each_time_are_told(make_rig: Make
 
 
 AVERAGED = ASKED | {
-    "noise__averaged_windows": 4,
+    "identification__target_mm": 1e-4,
     "simulation__gauges__flicker_mm": 0.01,
     "simulation__encoders__flicker": 0.01,
     "noise__encoder": 0.002,
@@ -179,7 +179,7 @@ AVERAGED = ASKED | {
 }
 
 
-async def test_records_are_means_of_several_windows_where_that_is_allowed_and_pays(make_rig, well_known):
+async def test_records_are_means_of_several_windows_where_that_is_needed_and_pays(make_rig, well_known):
     rig = make_rig(**AVERAGED)
     found = await measure_noise(rig)
     assert found.noise.windows == 4

@@ -195,7 +195,7 @@ class RobotPhysics:
         shown = inverse_kinematics(mechanism, commanding.geometry, commanding.branch, start)
         joints = shown / self._shown_per_mm
         self._motion = Motion(joints[[0, 0]], -1e9, 0.0)  # standstill
-        self._rows_passed = 0
+        self._rows_passed = self._moves = 0
         self.commands_differ = False
         self._unseen = np.zeros(6), np.zeros(6)
         first = continue_solution(
@@ -224,12 +224,13 @@ class RobotPhysics:
         motion = self._settings.motion
         with self._lock:
             distance = float(np.abs(np.diff(path, axis=0)).sum(axis=0).max())
-            scatter = motion.repeatability * self._random.standard_normal(6)
+            worn, self._moves = (1.0 + motion.growth_per_move) ** self._moves, self._moves + 1
+            scatter = worn * motion.repeatability * self._random.standard_normal(6)
             actual = path / self._shown_per_mm + np.linspace(0.0, 1.0, len(path))[:, None] * scatter
             actual[0] = self._motion.joints(self._update())
             self._unseen = (
                 self._unseen[1],
-                motion.unseen_repeatability * self._random_unseen.standard_normal(6),
+                worn * motion.unseen_repeatability * self._random_unseen.standard_normal(6),
             )
             stated_s = 0.0 if duration_s is None else duration_s + RAMP_S
             duration = max(motion.minimum_s, distance / motion.speed, stated_s)

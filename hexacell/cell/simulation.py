@@ -108,6 +108,12 @@ class SimulatedMotion(Section):
         "scatter of each joint at each stop beside what its encoder shows, 1 sigma",
         alias="unseen_repeatability_mm",
     )
+    growth_per_move: NotNegative = key(
+        0.0,
+        "share of itself by which either scatter grows with every move, as of a machine that works loose; "
+        "0.01: three times as large after 110 moves",
+        le=1.0,
+    )
 
 
 class SimulatedJoints(Section):

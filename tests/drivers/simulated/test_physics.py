@@ -106,13 +106,24 @@ def test_encoders_that_are_long_show_what_is_commanded_and_the_sliders_move_less
 
 
 def test_slider_stops_scatter_by_the_repeatability(make_twin) -> None:
-    twin = make_twin(motion__repeatability_mm=0.5, station_reach_mm=1e6)
+    stops = scattered_stops(make_twin(motion__repeatability_mm=0.5, station_reach_mm=1e6))
+    assert np.std(stops) == pytest.approx(0.5, rel=0.25)
+
+
+def test_the_scatter_of_a_machine_that_wears_grows_with_every_move(make_twin) -> None:
+    twin = make_twin(motion__repeatability_mm=0.05, motion__growth_per_move=0.02, station_reach_mm=1e6)
+    first, last = np.split(np.abs(scattered_stops(twin)), 2)
+    assert last.mean() > 2.0 * first.mean()
+
+
+def scattered_stops(twin) -> np.ndarray:
+    """How far joints stop beside their command, at 40 stops."""
     start = twin.physics.encoder_positions()
     stops = []
     for _ in range(40):
         there_and_back(twin, start)
         stops.append(twin.physics.encoder_positions() - start)
-    assert np.std(stops) == pytest.approx(0.5, rel=0.25)
+    return np.array(stops)
 
 
 def test_gauges_do_not_move_while_the_robot_moves(make_twin) -> None:

@@ -1,5 +1,6 @@
 """The CAN bus of the encoders: one receiving thread, and a time limit on every wait."""
 
+import errno
 import logging
 import re
 import threading
@@ -22,6 +23,8 @@ SLICE_S = 0.03
 
 SEND_TIMEOUT_S = 0.2
 """Longest wait for an interface to accept a frame."""
+FULL_S = 0.002
+"""Wait while the kernel's queue is full: it holds ten frames, and python-can does not wait (issue 2004)."""
 JOIN_TIMEOUT_S = 1.0
 """Longest wait for the receiving thread to end, for interfaces that ignore their time-out."""
 
@@ -170,12 +173,17 @@ class EncoderBus:
 
     def _send(self, message: can.Message) -> None:
         self._record(TrafficDirection.SENT, message)
-        try:
-            self._bus.send(message, timeout=SEND_TIMEOUT_S)
-        except Exception as error:
-            if self._failure is not None:
-                raise self._error("has failed", self._failure) from self._failure
-            raise self._error("does not accept a frame", error) from error
+        patience = Patience(SEND_TIMEOUT_S, SLICE_S, time.monotonic())
+        while True:
+            try:
+                return self._bus.send(message, timeout=SEND_TIMEOUT_S)
+            except Exception as error:
+                if self._failure is not None:
+                    raise self._error("has failed", self._failure) from self._failure
+                is_full = getattr(error, "error_code", None) == errno.ENOBUFS
+                if not is_full or patience.left_s(time.monotonic()) <= 0:
+                    raise self._error("does not accept a frame", error) from error
+            time.sleep(FULL_S)
 
     def _record(self, direction: TrafficDirection, message: can.Message) -> None:
         if self._wire.is_on:

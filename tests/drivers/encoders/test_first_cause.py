@@ -1,6 +1,7 @@
 """A message of silent or jumping encoders names the cause that is known, and advice that fits to it."""
 
 import threading
+from contextlib import closing, nullcontext
 from unittest.mock import Mock
 
 import can
@@ -92,6 +93,25 @@ def test_why_an_adapter_cannot_be_opened_is_told(monkeypatch, bus, told):
         monkeypatch.setattr(can, "Bus", Mock(side_effect=bus))
     with pytest.raises(BusError, match=told):
         EncoderBus(bus if isinstance(bus, dict) else {}, threading.Event())
+
+
+@pytest.mark.parametrize("stays", [False, True])
+def test_a_full_queue_of_the_kernel_is_waited_for(raw, monkeypatch, stays):
+    """It holds ten frames, where a search sends one to each of 127 nodes."""
+    full = can.CanOperationError("Failed to transmit: No buffer space available", 105)
+    with closing(EncoderBus({"interface": "virtual", "channel": raw.channel}, threading.Event())) as bus:
+        send, asked = bus.network.bus.send, []
+
+        def once_in_a_while(message, timeout=None):
+            asked.append(message)
+            if stays or len(asked) % 11 == 0:
+                raise full
+            send(message, timeout)
+
+        monkeypatch.setattr(bus.network.bus, "send", once_in_a_while)
+        with pytest.raises(BusError, match=r"buffer.*termination") if stays else nullcontext():
+            bus.network.scanner.search()
+            assert bus.wait_for(lambda: len(bus.network.scanner.nodes) == 6, 5.0)
 
 
 async def test_frames_of_others_show_that_the_bit_rate_is_right(raw, make_bank):

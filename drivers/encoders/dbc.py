@@ -5,6 +5,7 @@ was asked for, and a sample is complete if all six came within a window of time:
 simultaneous. cantools is imported when a cell names such a file.
 """
 
+import logging
 import threading
 import time
 from codecs import BOM_UTF8
@@ -32,6 +33,11 @@ ANGLES = {"deg": 1.0, "\u00b0": 1.0, "degree": 1.0, "rad": 57.29577951308232, "m
 SCALES = {JointUnit.MM: LENGTHS, JointUnit.DEG: ANGLES}
 COARSER = 1.0 + 1e-6
 """By so much a count of the cell file may be larger than the signal's, for rounding."""
+FARTHEST = 1e9
+"""No joint is there, in its unit: what is farther, infinite or no number means no position."""
+
+# Failures are raised as errors; without a handler cantools would also print its warnings.
+logging.getLogger("cantools").addHandler(logging.NullHandler())
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +128,8 @@ def _signal(
 
 def _named(all_of_them: Any, name: str, kind: str, settings: DbcSettings) -> Any:  # noqa: ANN401
     known = {one.name: one for one in all_of_them}
+    if sum(one.name == name for one in all_of_them) > 1:
+        raise FileError(f"has {kind} '{name}' twice", subject=settings.file, action="Remove one there")
     if name not in known:
         raise FileError(
             f"has no {kind} '{name}'",
@@ -209,12 +217,15 @@ class DbcSession(BankSession):
             self._incomplete.add(signal.frame)
             return None
         low, high, problem = signal.signal.minimum, signal.signal.maximum, ""
+        position = float(value) * signal.scale
+        if not abs(position) < FARTHEST:
+            problem = f"sends {value:g}, which is no position"
         if (low is not None and value < low) or (high is not None and value > high):
             problem = f"sends {value:g}, outside the range in the DBC file"
         for name, expected in self._described.must_be.items():
             if values.get(name) != expected and not problem:
                 problem = f"sends {name} {values.get(name)}, not {expected}"
-        return _Received(now, float(value) * signal.scale, problem)
+        return _Received(now, position, problem)
 
     def _sample(self) -> tuple[int, ...]:
         """The counts of frames that came after now, within the window."""

@@ -1,6 +1,7 @@
 """Encoders by a DBC file are read as the file says; messages and files that do not fit are told."""
 
 import asyncio
+import struct
 from collections.abc import Callable
 
 import pytest
@@ -10,7 +11,7 @@ from drivers.errors import BusError, InvalidSampleError, SilentNodeError
 from drivers.interfaces import DeviceIdentity
 from hexacell.cell.devices import LinearEncoderSettings
 from hexacell.errors import DeviceError, FileError, UsageError
-from tests.drivers.encoders.dbc.conftest import SIGNALS, Wire, dbc_text
+from tests.drivers.encoders.dbc.conftest import FIRST_ID, HEAD, SIGNALS, Wire, dbc_text
 from tests.waiting import until
 
 POSITIONS = (1.5, -2.0, 3.0, 4.0, 5.0, 6.0)
@@ -110,6 +111,33 @@ async def test_a_file_that_does_not_fit_is_told(settings, dbc_file, wire, text, 
     dbc_file.write_text(text)
     with pytest.raises(FileError, match=message):
         await DbcBank(settings(wire.settings, signals=signals)).open()
+
+
+async def test_messages_of_one_name_are_refused_and_nothing_is_printed(settings, dbc_file, wire, capfd):
+    again = dbc_text("m").removeprefix(HEAD)  # which of the two units holds nobody knows
+    dbc_file.write_text(dbc_text() + again)
+    with pytest.raises(FileError, match="has message 'ENC1' twice"):
+        await DbcBank(settings(wire.settings)).open()
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(("sent", "told"), [("nan", "nan"), ("-inf", "-inf"), ("3.4e38", "3.4e[+]38")])
+async def test_a_floating_point_number_that_is_no_position_is_told(settings, dbc_file, wire, sent, told):
+    text = dbc_text().replace("(0.0005,0) [-2000|2000]", "(1,0) [0|0]")
+    dbc_file.write_text(
+        text + "".join(f"SIG_VALTYPE_ {FIRST_ID + leg} Position : 1;\n" for leg in range(6))
+    )
+    bank = DbcBank(settings(wire.settings))
+    opening = asyncio.create_task(bank.open())
+
+    def is_done() -> bool:
+        for leg in range(6):
+            wire.send(FIRST_ID + leg, struct.pack("<f", float(sent)) + b"\0\0")
+        return opening.done()
+
+    await until(is_done)
+    with pytest.raises(InvalidSampleError, match=f"leg 1 .*sends {told}, which is no position"):
+        await opening
 
 
 OVERLAPPING = ' SG_ Again : 16|8@1+ (1,0) [0|255] "" PC\n'

@@ -21,6 +21,8 @@ MAX_BYTES = 64
 SLOW = "State a longer timeout_s, or let no other program read"
 RIGHTS, OTHER = "Let this user read", "Name a file with millidegrees, not"
 PLAUSIBLE_C = (-100.0, 300.0)
+UNMEASURED, DS18B20 = "85000", "temperature"
+"""What a DS18B20, whose file has this name, gives until it has measured since its supply came."""
 
 _log = logging.getLogger(__name__)
 
@@ -70,6 +72,8 @@ class SysfsThermometer:
             celsius = int(raw) / 1000
         except ValueError:
             raise self._error(f"gives no number but {raw!r}", OTHER if raw else SLOW) from None
+        if raw == UNMEASURED and self._path.name == DS18B20:
+            raise self._error("gives 85 deg C, as it does unmeasured", "Check the supply and cable of")
         low, high = PLAUSIBLE_C
         if not low <= celsius <= high:
             raise self._error(f"gives {celsius:g} deg C, which is implausible")

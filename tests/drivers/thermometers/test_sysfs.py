@@ -40,7 +40,7 @@ async def room(path: Path, timeout_s: float) -> AsyncIterator[SysfsThermometer]:
 
 
 @pytest.mark.parametrize(
-    ("text", "celsius"), [("21375\n", 21.375), ("-500\n", -0.5), ("0", 0.0), ("85000\n", 85.0)]
+    ("text", "celsius"), [("21375\n", 21.375), ("-500\n", -0.5), ("0", 0.0), ("85125\n", 85.125)]
 )
 async def test_millidegrees_are_read(path, room, text, celsius):
     show(path, text)
@@ -54,6 +54,7 @@ async def test_millidegrees_are_read(path, room, text, celsius):
         ("NO\n", "gives no number but 'NO'", OTHER),
         ("21.5\n", "gives no number but '21.5'", OTHER),
         ("\xff\xfe", "gives no number", OTHER),
+        ("85000\n", "gives 85 deg C, as it does unmeasured", "Check the supply and cable of"),
         ("-127000\n", "gives -127 deg C, which is implausible", SENSOR),
         ("-2147483648\n", "gives -2.14748e[+]06 deg C", SENSOR),
         ("9" * 5000, "gives 1e[+]61 deg C|gives no number", SENSOR),
@@ -64,6 +65,13 @@ async def test_contents_that_are_no_temperature_are_refused(path, room, text, wo
     with pytest.raises(DeviceError, match=f"^thermometer room: {words}") as refusal:
         await room.read()
     assert refusal.value.action == f"{check} {path}"
+
+
+async def test_other_thermometers_than_1_wire_may_show_85_degrees(path):
+    hot = SysfsThermometer(ThermometerSettings(name="hot", path=str(path.with_name("temp1_input"))))
+    show(path.with_name("temp1_input"), "85000")
+    assert (await hot.read()).celsius == 85.0
+    await hot.close()
 
 
 async def test_an_unreadable_file_is_an_error_until_it_can_be_read(path, room):

@@ -157,7 +157,5 @@ class ModbusGauge(ValueOnlyGauge):
         [number] = self._format.unpack(b"".join(words))
         if number in self._modbus.at_end:
             raise self._at_end(f"shows {number}, as at an end of its travel")
-        if number != number:  # noqa: PLR0124 - what is no number differs from itself
-            raise FrameRejected(frame)
         text = f"{frame.hex(' ', WORD)} = {number:g}"
         return DisplayedValue(number * self._modbus.mm_per_unit, self._decimals, Unit.MM, text)

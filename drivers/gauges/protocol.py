@@ -132,6 +132,9 @@ class GaugeState:
         return tuple(found)
 
 
+LARGEST_MM = 1e6
+"""No instrument shows this: numbers beyond it, infinite ones and what is no number mean no value."""
+
 TRAVEL_MARGIN = 1.1
 """Instruments travel a little farther than they are sold for."""
 

@@ -190,6 +190,10 @@ class SerialGauge(ABC):
     def _plausible(self, frame: bytes) -> protocol.DisplayedValue:
         """The value in an answer, which is in mm and fits to those before; raises as ``_parse_value``."""
         shown = self._parse_value(frame)
+        if not abs(shown.value) < protocol.LARGEST_MM:
+            action = "Look at its display, and name in at_end what it sends at an end of its travel"
+            error = self._error(WrongAnswer, f"shows {shown.text}, which is no length", action)
+            raise protocol.ImplausibleValue(frame, error)
         set_to = None if self._state is None else self._state.unit
         if self._history.is_inch(shown, set_to, self.spec.inch_decimals):
             raise self._error(WrongSetting, *INCH)

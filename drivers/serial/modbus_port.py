@@ -31,6 +31,7 @@ FUNCTIONS = {"holding": HOLDING, "input": INPUT}
 BROADCAST = 0
 NUL = b"\0"
 """Real lines send some before a frame, and no device has this address."""
+ADDRESS_AND_CHECKSUM, EXCEPTION = 3, 0x80
 FRAME_BYTES, REGISTER_BYTES = 5, 2
 """Bytes of an answer without registers (device, function, length, checksum), and of each register."""
 
@@ -65,7 +66,10 @@ def wrong_frame(received: bytes, device: int) -> tuple[str, str]:
         what = "Modbus ASCII" if received.startswith(b":") else "text, no Modbus"
         return f"{what}: {quoted(received)}", "Set it to Modbus RTU, or correct port in the cell file"
     checksum = import_module("pymodbus.framer").FramerRTU.compute_CRC(received[:-2])
-    if received[0] != device and checksum == int.from_bytes(received[-2:]):
+    if len(received) > ADDRESS_AND_CHECKSUM and checksum == int.from_bytes(received[-2:]):
+        if received[0] == device:
+            action = "End other programs that ask it, and correct register, kind and type in the cell file"
+            return f"a whole frame that does not answer the request: {received.hex(' ')}", action
         action = "Correct device, or devices, in the cell file, and give each device on the line its own"
         return f"a frame of device {received[0]}, not {device}", action
     what = f"{quoted(received)}, no single frame with a right checksum"
@@ -114,6 +118,9 @@ class ModbusPort(RequestPort):
                 client.comm_params.timeout_connect = timeout_s
                 read = client.read_holding_registers if function == HOLDING else client.read_input_registers
                 answer = read(address, count=count, device_id=device)
+            if answer.function_code & ~EXCEPTION != function:
+                self._must_clear = True
+                raise NoAnswer(self._received, self._sent)
             if not (answer.isError() and answer.exception_code in BUSY):
                 break
             self.closing.wait(PAUSE_S)

@@ -13,6 +13,7 @@ from math import inf
 import serial
 
 from drivers.serial import opening, request_port
+from drivers.serial.received import SHOWN_BYTES, quoted
 from drivers.wire_trace import TrafficDirection
 from hexacell.clock import Patience
 from hexacell.errors import DeviceError
@@ -113,6 +114,7 @@ class SerialPort(request_port.RequestPort):
         patience = Patience(longest_s, opening.SLICE_S, time.monotonic())
         while time.monotonic() - self._last_traffic < self._silence_s or port.in_waiting:
             if patience.left_s(time.monotonic()) < 0.0:
+                self._keep_unsolicited(surplus)
                 raise self._not_silent()
             surplus += self._read(port)
             self._require_silence_after(surplus)
@@ -181,8 +183,9 @@ class SerialPort(request_port.RequestPort):
             raise opening.lost_port(self.subject, self.url, str(error)) from error
 
     def _not_silent(self) -> DeviceError:
+        latest = b"".join(self.unsolicited)[-SHOWN_BYTES:]
         return DeviceError(
-            f"the device on {self.url} keeps sending unasked",
+            f"the device on {self.url} keeps sending unasked: {quoted(latest)} came last",
             subject=self.subject,
             action="Switch its continuous output off, or correct port and protocol in the cell file",
         )

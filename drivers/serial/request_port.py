@@ -13,8 +13,8 @@ from typing import Any
 from drivers.errors import PortLost
 from drivers.wire_trace import LineRecord, TraceRecorder, TrafficDirection
 
-LINE_ENDS = b"\r\n\0"
-"""Ends of lines, and the NUL bytes that lines put before a frame when they are switched."""
+LINE_ENDS = b"\r\n\0\x11\x13"
+"""Ends of lines; NUL bytes, which lines put before a frame when they are switched; and XON and XOFF."""
 LINE_END = re.compile(rb"[\r\n\0]+")
 LOG_LENGTH = 256
 FRAME_LIMIT = 256

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 import serial
 
-from drivers.errors import GaugeSilent, PortLost
+from drivers.errors import GaugeSilent, PortLost, WrongAnswer
 from drivers.gauges.cdi import CdiGauge
 from drivers.gauges.described import RequestGauge, StreamGauge
 from drivers.gauges.digimatic_usb import DigimaticUsbGauge
@@ -35,6 +35,7 @@ CDI: Any = (CdiGauge, "cdi", {})
 SYLVAC: Any = (SylvacGauge, "sylvac", {})
 ID_H: Any = (IdHGauge, "mitutoyo-id-h", {})
 REQUEST = (RequestGauge, "request", {"request": ASKED})
+NUMBER = (RequestGauge, "request", {"request": ASKED | {"answer": "X?=?(.*)"}})
 
 CAUSES = [
     (DIGIMATIC, b"", r"does not answer within 0\.05 s.*settle_s"),
@@ -59,6 +60,8 @@ CAUSES = [
     (DIGIMATIC, b"\x15\n", "so it does not know the question"),
     (CDI, b"01A+0000.123\r", r"answers b'01A\+0000\.123\\r' where protocol cdi has .*Correct protocol"),
     (MUX, b"login: \r", r"answers b'login: \\r' where protocol mux10"),
+    (NUMBER, b"9.9E37\r", r"shows 9\.9E37, which is no length\. Look at its display"),
+    (NUMBER, b"-99999999.999\r", "which is no length"),
     (REQUEST, b"Y=1.234\r", "Correct answer, protocol or port in the cell file"),
     (DIGIMATIC, b"# no data\n", "its adapter reports: no data"),
     (MUX, b"911\r", r"does not answer its multiplexer \(911\)"),
@@ -137,6 +140,8 @@ FRAMES = [
     (b":070404000003E8F2\r\n", "Modbus ASCII", "Set it to Modbus RTU"),
     (b"+1.234\r", "text, no Modbus", "Set it to Modbus RTU, or correct port"),
     (b"\x08" + FRAME[1:] + crc(b"\x08" + FRAME[1:]), "a frame of device 8, not 7", "Correct device"),
+    (FRAME + crc(FRAME), "a whole frame that does not answer the request: 07 04", "other programs"),
+    (b"\xff\xff", "no single frame", "no other device"),
     (FRAME + b"\0\1", "no single frame with a right checksum", "no other device has its address"),
 ]
 
@@ -156,6 +161,51 @@ async def test_adapters_that_echo_or_add_zeros_to_frames_are_read(before, after)
         twin.answer = lambda command: command + b"\0\0" + before + answer(command) + after
         await made.gauges["x"].open()
         assert (await made.gauges["x"].read()).value_mm == pytest.approx(1.0)
+
+
+async def told_for(frame: bytes) -> str:
+    """What is told of a line where every question is answered so, and a checksum."""
+
+    def stated(_protocol: str, number: int) -> dict[str, Any]:
+        described = {"register": 2 * number, "type": "float32", "mm_per_unit": 1.0}
+        return {"modbus": described, "settle_s": 0.0}
+
+    async with cell(["modbus"] * 3, timeout_s=0.5, stated=stated) as made:
+        made.links.worst_latency_s = 0.01
+        made.rack.line("x").instrument.answer = lambda _command: frame + crc(frame)
+        with pytest.raises(WrongAnswer) as told:
+            await made.gauges["x"].open()
+    return str(told.value)
+
+
+NO_NUMBERS = {"inf": "7f800000", "nan": "7fc00000", "-3.40282e+38": "ff7fffff"}
+
+
+@pytest.mark.parametrize("shown", NO_NUMBERS)
+async def test_floating_point_numbers_that_are_no_length_are_told(shown):
+    assert f"= {shown}, which is no length" in await told_for(bytes.fromhex(f"010404{NO_NUMBERS[shown]}"))
+
+
+@pytest.mark.parametrize("frame", ["0103043f800000", "018302"])
+async def test_an_answer_to_another_function_is_none(frame):
+    """Another master on the line asks holding registers, where this one asks input registers."""
+    assert "a whole frame that does not answer the request" in await told_for(bytes.fromhex(frame))
+
+
+async def test_flow_control_around_frames_is_no_answer(dialogue, links, settings):
+    gauge = Mux10Gauge(settings("mux10", channel=1), links)
+    value = b"\x13\x1101A+0000.123\r\x11"
+    dialogue.expect((b"1\r", value), (b"V\r", b"\x11MUX-10\r\x11"), *[(b"1\r", value)] * 2)
+    assert (await gauge.open()).description == "MUX-10"
+    assert (await gauge.read()).value_mm == 0.123
+
+
+async def test_what_comes_unasked_is_shown(dialogue, links, settings):
+    gauge = Mux10Gauge(settings("mux10", channel=1), links)
+    dialogue.expect(*[(b"1\r", b"\x0201A+0000.123\r\x03")] * 6)
+    with pytest.raises(DeviceError, match=r"keeps sending unasked: b'[^']*\\x03' came last"):
+        await gauge.open()
+    dialogue.expected.clear()
 
 
 async def test_modbus_that_is_only_echoed_names_the_echo():

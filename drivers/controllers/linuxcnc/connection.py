@@ -148,6 +148,7 @@ class Connection:
         """
         line = protocol.encode_command(command, self.subject)
         async with self.send_turn():
+            self._lines.clear()  # an answer that came twice would be taken for that to this command
             self._outstanding = command
             await self._write(line)
             return await self._outstanding_response(command, timeout_s or self.timeouts.answer)

@@ -76,6 +76,12 @@ async def test_an_answer_after_its_timeout_is_discarded(play):
     assert (await pose_of(driver)).x == 5.0
 
 
+async def test_an_answer_that_comes_twice_is_not_that_to_the_next_query(play):
+    driver = await play.opened([("get joint_pos", 2 * b"JOINT_POS 6 5 4 3 2 1\r\n"), JOINTS])
+    assert await joints_of(driver) == (6.0, 5.0, 4.0, 3.0, 2.0, 1.0)
+    assert await joints_of(driver) == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+
+
 async def test_a_server_that_was_started_anew_is_connected_to_again(play):
     driver = await play.opened(
         [("get abs_act_pos", ARRIVED, play.HANG_UP)], [*play.OPENING[:-1], ("get abs_act_pos", HALF_WAY)]

@@ -72,6 +72,23 @@ async def test_others_watch_until_they_take_control(scripted_run) -> None:
             await client.until(lambda one: one == StatusChanged(status=Status.RUNNING))
 
 
+async def test_fifty_clients_are_told_all_and_one_commands_whoever_hangs_up(scripted_run) -> None:
+    told = [FIRST, *(StatusChanged(status=status) for status in (Status.RUNNING, Status.PAUSED))]
+    async with scripted_run() as run:
+        clients = [await run.client() for _ in range(50)]
+        for client in clients:
+            await client.until_control(is_in_control=client is clients[0])
+        for client in clients[1::2]:
+            client.hang_up()
+        for message in told[1:]:
+            run.audience.send(message)
+        for client in clients[::2]:
+            await client.until(lambda one: one == told[-1])
+            assert [one for one in client.told if isinstance(one, StatusChanged)] == told
+        await clients[0].connection.give(Undo())
+        assert [await run.calls.get() for _ in range(2)] == ["control", Undo()]
+
+
 @pytest.mark.parametrize("keep_running", [True, False])
 async def test_who_leaves_says_whether_the_run_goes_on(scripted_run, keep_running: bool) -> None:
     async with scripted_run() as run:

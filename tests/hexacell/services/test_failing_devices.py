@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from drivers.errors import ConnectionLost
 from hexacell.cell.devices import ThermometerSettings
 from hexacell.cell.recovery import Action
 from hexacell.cell.simulation import FaultKind, SimulatedFault
@@ -42,6 +43,20 @@ async def test_an_unplugged_device_that_is_plugged_in_again_is_recovered(
     assert all(failure.action is not Action.ABORT for failure in failures)
     voided = [str(event.at) for event in site.happened(events.SetInvalidated)]
     assert ("P2" in voided) == voids, "what was opened again has lost its zero"
+
+
+async def test_without_its_controller_nothing_is_begun_and_the_same_order_works_once_it_is_there(make_site):
+    site = make_site()
+    before = site.config
+    site.simulated.faults.inject(UNPLUGGED, "controller")
+    with pytest.raises(ConnectionLost) as refusal:
+        await site.calibrate()
+    assert refusal.value.exit_code is ExitCode.HARDWARE
+    assert (site.folder.path.exists(), site.config) == (False, before)
+    site.simulated.faults.clear(UNPLUGGED, "controller")
+    with pytest.raises(Interruption):
+        await site.calibrate(on(events.RecordTaken, stop_here))
+    assert len(site.happened(events.RecordTaken)) == 1
 
 
 async def test_another_device_than_the_run_was_begun_with_is_refused(finished, make_site) -> None:

@@ -2,6 +2,7 @@
 
 import threading
 from contextlib import closing, nullcontext
+from typing import Any
 from unittest.mock import Mock
 
 import can
@@ -100,7 +101,8 @@ def test_a_full_queue_of_the_kernel_is_waited_for(raw, monkeypatch, stays):
     """It holds ten frames, where a search sends one to each of 127 nodes."""
     full = can.CanOperationError("Failed to transmit: No buffer space available", 105)
     with closing(EncoderBus({"interface": "virtual", "channel": raw.channel}, threading.Event())) as bus:
-        send, asked = bus.network.bus.send, []
+        port: Any = bus.network.bus
+        send, asked = port.send, []
 
         def once_in_a_while(message, timeout=None):
             asked.append(message)
@@ -108,7 +110,7 @@ def test_a_full_queue_of_the_kernel_is_waited_for(raw, monkeypatch, stays):
                 raise full
             send(message, timeout)
 
-        monkeypatch.setattr(bus.network.bus, "send", once_in_a_while)
+        monkeypatch.setattr(port, "send", once_in_a_while)
         with pytest.raises(BusError, match=r"buffer.*termination") if stays else nullcontext():
             bus.network.scanner.search()
             assert bus.wait_for(lambda: len(bus.network.scanner.nodes) == 6, 5.0)

@@ -136,9 +136,9 @@ def setting_refused(what: str, leg: Leg) -> DeviceError:
 def duplicated_node(what: str, leg: Leg) -> DeviceError:
     """The error for a node id that two devices share."""
     return DeviceError(
-        f"{what}: two devices share node id {leg.node}, or another program uses this bus",
+        f"{what}: two devices share node id {leg.node}, another program uses this bus, or it answers late",
         subject=leg.subject,
-        action="Unplug one of them, or give it another node id, then open the encoders again",
+        action="Unplug one, give it another node id, or raise timeout_s, then open the encoders again",
     )
 
 

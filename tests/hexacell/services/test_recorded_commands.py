@@ -92,10 +92,9 @@ def measured_noise(*gauges_mm: float) -> events.NoiseMeasured:
 
 def test_records_in_a_run_folder_are_weighted_by_the_noise_that_the_run_measured(tmp_path, paper, visit):
     cell, measured = load_cell(bundled_config("simulated-hexaglide")), visit(seed=2).measured(0.01, seed=1)
-    key, drift = SetKey(phase=Phase.IDENTIFY, point=1), {"walk_mm": 0.002, "walk_s": 20.0}
-    reading = READING.model_copy(update={"counts": ((0,) * 6,)})
-    closed = events.SetClosed(at=key, drift_mm=(0.0,) * 3, reading=reading, **drift)
-    run = run_of(tmp_path, started(paper.nominal, paper), measured_noise(0.01, 0.04, 0.01), closed)
+    noise, reading = measured_noise(0.01, 0.04, 0.01), READING.model_copy(update={"counts": ((0,) * 6,)})
+    closed = events.SetClosed(at=noise.at, drift_mm=(0.0,) * 3, reading=reading, walk_mm=0.002, walk_s=20.0)
+    run = run_of(tmp_path, started(paper.nominal, paper), noise, closed)
     told = noise_of_run(run, cell.settings)
     assert told is not None
     assessed = fit_measurements(cell, measured, run)

@@ -65,16 +65,15 @@ def test_a_reference_reached_from_another_side_is_no_slipped_gauge(allowances: A
 def test_a_drift_goes_by_the_time_of_the_readings_as_far_as_it_is_known(allowances: Allowances) -> None:
     noise = replace(allowances.robot.noise, walk_mm=0.01, walk_s=30.0)
     drifting = replace(allowances, robot=replace(allowances.robot, noise=noise))
-    zero, now = (reading(np.zeros(3), np.zeros(6), FROM_BELOW) for _ in range(2))
-    pose = allowances.settings.identification.points[0]
+    zero, pose = reading(np.zeros(3), np.zeros(6), FROM_BELOW), allowances.settings.identification.points[0]
 
-    def readings(began_s: float | None, walking: Allowances = drifting) -> float:
-        taken = SimpleNamespace(reading=zero.model_copy(update={"at_s": began_s}), pose=pose)
-        at_zero = SetState((taken,) * 11)  # type: ignore[arg-type]
-        return since_zero(walking, at_zero, now.model_copy(update={"at_s": 4000.0})).readings
+    def readings(known: Allowances, *at_s: float | None) -> float:
+        before, now = (zero.model_copy(update={"at_s": one}) for one in at_s)
+        taken = (SimpleNamespace(reading=before, pose=pose),) * 11
+        return since_zero(known, SetState(taken), now).readings  # type: ignore[arg-type]
 
-    assert [readings(3670.0), readings(400.0), readings(None)] == [11.0, 120.0, 11]
-    assert readings(400.0, allowances) == 11, "an older run has found how far it drifts a reading"
+    assert [readings(drifting, began_s, 4000.0) for began_s in (3670.0, 400.0, None)] == [11, 120, 11]
+    assert readings(allowances, 400.0, 4000.0) == 11, "of an older run it is known how far, by readings"
 
 
 def test_few_visits_leave_room_for_a_larger_scatter(allowances: Allowances) -> None:

@@ -32,9 +32,7 @@ async def test_they_are_noticed_and_references_read_again_become_records(make_ri
     assert first.walk_mm == 0.0, "one set may be of a gauge that slipped"
     assert 0.002 < second.walk_mm < 0.02
     assert 5.0 < 1e3 * second.walk_mm / np.sqrt(second.walk_s / 60.0) < 20.0, "as simulated, a minute"
-    shown_s = state.measurements().times_s
-    assert np.isfinite(shown_s).all()
-    assert (np.diff(shown_s) > 0.0).all()
+    assert (np.diff(state.measurements().times_s) > 0.0).all()
     told = [event.text(state) or "" for event in (first, second)]
     assert ["the gauges drift" in text for text in told] == [False, True]
     labels = [record.id for record in state.measurements().records]

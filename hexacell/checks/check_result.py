@@ -88,6 +88,7 @@ def check_result(
             check.settings,
             check.robot,
             check.plan.task.reachable(stated.estimate.belief),
+            is_evident=stated.is_consistent,
             length=None if earlier is None else earlier.length,
         ),
         is_consistent=stated.is_consistent,

@@ -72,7 +72,7 @@ def published_result(cell: str, run: PastRun, *, is_simulated: bool) -> Publishe
     if not summary.is_over or summary.ended is None:
         return None
     verdict, position = summary.verdict, summary.position
-    numbers = (math.nan,) * 3 if position is None else (position.value, position.expanded, position.limit)
+    numbers = (None,) * 3 if position is None else (position.value, position.expanded, position.limit)
     return PublishedResult(
         f"{cell}/{run.name}",
         is_simulated,
@@ -82,7 +82,7 @@ def published_result(cell: str, run: PastRun, *, is_simulated: bool) -> Publishe
         summary.line,
         summary.mode,
         "" if verdict is None else verdict.value,
-        *numbers,
+        *(math.nan if one is None else one for one in numbers),
     )
 
 

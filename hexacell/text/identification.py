@@ -24,7 +24,10 @@ def identification_report(assessed: Assessment) -> str:
     found, budget = assessed.found, assessed.budget
     expanded = ""
     if budget is not None and not assessed.refused:
-        expanded = f" U at the task poses is {shown(budget.expanded_mm)}."
+        size = f"is {shown(budget.expanded_mm)}"
+        if not assessed.is_evident:
+            size = "is not stated: the records contradict the model"
+        expanded = f" U at the task poses {size}."
     pairs = [wrapped(sentence, indent=2) for sentence in pair_sentences(assessed)]
     if more := len(assessed.correlated) - len(pairs):
         pairs.append(f"and {counted(more, 'more pair')} beyond 0.9 (--json lists them)")
@@ -32,7 +35,7 @@ def identification_report(assessed: Assessment) -> str:
         "\n".join(wrapped(sentence) for sentence in findings(assessed)),
         wrapped(f"Verdict: {Verdict.NOT_EVALUATED}, as no held-out records test this model.{expanded}"),
         accuracy_table(assessed),
-        budget_table(budget),
+        budget_table(budget, is_evident=assessed.is_evident),
         wrapped(
             f"{len(found.free)} parameters from {found.records} records at {found.points} points; the "
             f"solver ended because {found.termination.value} ({found.solution.iterations} iterations)."
@@ -142,7 +145,7 @@ def repeatability_lines(scatter: Repeatability | None) -> str:
     )
 
 
-def budget_table(budget: UncertaintyBudget | None) -> str:
+def budget_table(budget: UncertaintyBudget | None, *, is_evident: bool = True) -> str:
     """One line for the noise and each effect that matters, their sum, and what the records cannot show."""
     if budget is None:
         return ""
@@ -162,7 +165,8 @@ def budget_table(budget: UncertaintyBudget | None) -> str:
             lines.append(f"  {line.effect.name:42}{size:>12}{shares}")
     standard = "standard uncertainty (root of the squares)"
     lines.append(f"  {standard:70}{unit.number(budget.standard_mm):>8}")
-    lines.append(f"  {expanded:70}{unit.number(budget.expanded_mm):>8}")
+    if is_evident:
+        lines.append(f"  {expanded:70}{unit.number(budget.expanded_mm):>8}")
     unseen = []
     for line in budget.unseen:
         mm = line.per_unit_mm

@@ -46,6 +46,8 @@ def verification_text(verified: Verification) -> str:
 
 
 def _size(error: JudgedError, unit: str) -> str:
+    if error.expanded is None:
+        return error.with_u(unit)
     shown = error.shown_in(unit)
     return f"{shown.length(error.value)}, U {shown.number(error.expanded)}"
 
@@ -176,15 +178,10 @@ def improvement_sentence(
     now = f"{expected.now_mm:.3g} mm" if unit_of(expected.now_mm) is MM else shown(expected.now_mm)
     before, after = "the current config", f"0 +- {shown(expected.expanded_mm)} with this one"
     if verified is not None:
-        before, after = "the config before", f"{_with_u(verified.position)} with the new config"
+        before, after = "the config before", f"{verified.position.with_u('mm')} with the new config"
         if verified.alone is not None:
-            after = f"{_with_u(verified.alone)} with the best geometry alone, {after}"
+            after = f"{verified.alone.with_u('mm')} with the best geometry alone, {after}"
     return f"Largest position error at the task poses: {now} with {before}, {after}."
-
-
-def _with_u(error: JudgedError) -> str:
-    shown = error.shown_in("mm")
-    return f"{shown.number(error.value)} +- {shown.length(error.expanded)}"
 
 
 def teaching_sentence(moved: TaskDisplacement | None) -> str:

@@ -8,7 +8,11 @@ import numpy as np
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.design.decorrelation import DecorrelatingPose, decorrelating_poses
-from hexacell.identification.diagnostics.model_tests import PointPrediction, leave_one_point_out
+from hexacell.identification.diagnostics.model_tests import (
+    PointPrediction,
+    contradicted_points,
+    leave_one_point_out,
+)
 from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicted_accuracy
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
 from hexacell.identification.identified_zeros import IdentifiedZeros
@@ -85,6 +89,12 @@ class Assessment:
         return gates(
             found.estimate, self.tolerance_violations, residuals=found.goodness, impossible=impossible
         )
+
+    @property
+    def is_evident(self) -> bool:
+        """Whether no records contradict the model, so that an expanded uncertainty by it can be stated."""
+        is_too_large = self.found.goodness.agreement is ChiSquareVerdict.TOO_LARGE
+        return not is_too_large and not contradicted_points(self.points)
 
     @property
     def refused(self) -> bool:

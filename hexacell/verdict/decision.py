@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from enum import StrEnum
+from functools import partial
 from math import isfinite
 from typing import TYPE_CHECKING, Literal, Self
 
@@ -65,23 +66,26 @@ def decide(error: LargestError, limit: float, guard_band_factor: float = 1.0) ->
 class JudgedError(Frozen):
     """The largest error over the task poses, its expanded uncertainty and limit, mm or deg; the verdict.
 
-    The guard band of the decision is ``guard_band_factor`` times the expanded uncertainty.
+    The guard band of the decision is ``guard_band_factor`` times the expanded uncertainty. That is None,
+    and nothing decided, where the records contradict the model from which it would follow.
     """
 
     value: float
-    expanded: float
+    expanded: float | None
     limit: float
     verdict: Verdict
     guard_band_factor: float = 1.0
 
     @classmethod
-    def of(cls, error: LargestError, limit: float, guard_band_factor: float) -> JudgedError:
-        """The decision on an error."""
+    def of(
+        cls, error: LargestError, limit: float, guard_band_factor: float, *, is_evident: bool = True
+    ) -> JudgedError:
+        """The decision on an error; ``is_evident``: whether the evidence for the model holds."""
         return cls(
             value=error.value,
-            expanded=error.expanded,
+            expanded=error.expanded if is_evident else None,
             limit=limit,
-            verdict=decide(error, limit, guard_band_factor),
+            verdict=decide(error, limit, guard_band_factor) if is_evident else Verdict.NOT_EVALUATED,
             guard_band_factor=guard_band_factor,
         )
 
@@ -89,7 +93,8 @@ class JudgedError(Frozen):
     def guard_band(self) -> str:
         """The guard band as a multiple of U, in words; empty where it is U, or the verdict is a pass."""
         factor = self.guard_band_factor
-        return "" if factor == 1.0 or self.verdict is Verdict.PASS else f"{factor:g} U"
+        is_named = factor != 1.0 and self.verdict is not Verdict.PASS and self.expanded is not None
+        return f"{factor:g} U" if is_named else ""
 
     def shown_in(self, unit: str) -> ShownUnit:
         """The unit in which people read it; ``unit`` is that of its figures."""
@@ -102,8 +107,14 @@ class JudgedError(Frozen):
 
     def sentence(self, unit: str) -> str:
         """The error +- its uncertainty with the rule, in words."""
+        return f"{self.with_u(unit)} ({self.rule(unit)})"
+
+    def with_u(self, unit: str) -> str:
+        """The error and its uncertainty, or that this is not stated, in words."""
         shown = self.shown_in(unit)
-        return f"{shown.number(self.value)} +- {shown.length(self.expanded)} ({self.rule(unit)})"
+        if self.expanded is None:
+            return f"{shown.length(self.value)}, U not stated, as the evidence failed"
+        return f"{shown.number(self.value)} +- {shown.length(self.expanded)}"
 
 
 def worst_verdict(verdicts: Iterable[Verdict]) -> Verdict:
@@ -124,12 +135,12 @@ class GeometryErrors(Frozen):
     orientation: JudgedError
 
     @classmethod
-    def of(cls, errors: TaskErrors, limits: ErrorLimits) -> Self:
-        """The decision on errors under limits."""
-        factor = limits.guard_band_factor
+    def of(cls, errors: TaskErrors, limits: ErrorLimits, *, is_evident: bool) -> Self:
+        """The decision on errors under limits, as far as the evidence for the model holds."""
+        judged = partial(JudgedError.of, guard_band_factor=limits.guard_band_factor, is_evident=is_evident)
         return cls(
-            position=JudgedError.of(errors.position, limits.position_mm, factor),
-            orientation=JudgedError.of(errors.orientation, limits.orientation_deg, factor),
+            position=judged(errors.position, limits.position_mm),
+            orientation=judged(errors.orientation, limits.orientation_deg),
         )
 
     @property
@@ -173,21 +184,26 @@ class VerifiedAccuracy(Frozen):
         robot: Robot,
         task: Task,
         *,
+        is_evident: bool,
         of_geometry: TaskErrors | None = None,
         alone: TaskErrors | None = None,
         length: LengthResult | None = None,
         either_side: tuple[EitherSide, ...] = (),
     ) -> VerifiedAccuracy:
-        """The decision on errors at the poses of a ``task`` that the ``robot`` reaches."""
-        joint_unit, limits = robot.mechanism.words.joint_unit, settings.acceptance
-        judged = GeometryErrors.of(errors, limits)
+        """The decision on errors at the poses of a ``task`` that the ``robot`` reaches.
+
+        Where the evidence for the model failed it is not ``is_evident``, and no U is stated.
+        """
+        joint_unit = robot.mechanism.words.joint_unit
+        judge = partial(GeometryErrors.of, limits=settings.acceptance, is_evident=is_evident)
+        judged = judge(errors)
         return cls(
             position=judged.position,
             orientation=judged.orientation,
             poses=len(task.poses),
             task_named=bool(settings.task.poses),
-            of_geometry=None if of_geometry is None else GeometryErrors.of(of_geometry, limits),
-            alone=None if alone is None else GeometryErrors.of(alone, limits).position,
+            of_geometry=None if of_geometry is None else judge(of_geometry),
+            alone=None if alone is None else judge(alone).position,
             worst=robot.to_command(task.poses.pose(errors.worst)).as_tuple(),
             length=length,
             scale_of="encoders" if joint_unit is JointUnit.MM else "drawing",

@@ -56,7 +56,7 @@ def fit_document(assessed: Assessment) -> dict[str, Any]:
             for pair, pose in assessed.correlated
         ],
         "accuracy": _accuracy(assessed),
-        "uncertainty": assessed.budget and _budget(assessed.budget),
+        "uncertainty": assessed.budget and _budget(assessed.budget, is_evident=assessed.is_evident),
         "refused": assessed.refused,
         "gates": [gate.model_dump() for gate in assessed.gates],
         "possible_causes": [asdict(cause) for cause in assessed.possible_causes],
@@ -93,9 +93,11 @@ def _accuracy(assessed: Assessment) -> dict[str, Any] | None:
     }
 
 
-def _budget(budget: UncertaintyBudget) -> dict[str, Any]:
-    figures = ("noise_mm", "systematic_mm", "standard_mm", "expanded_mm", "expanded_deg")
-    return {name: getattr(budget, name) for name in figures} | {"lines": [*map(_line, budget.lines)]}
+def _budget(budget: UncertaintyBudget, *, is_evident: bool) -> dict[str, Any]:
+    figures = {name: getattr(budget, name) for name in ("noise_mm", "systematic_mm", "standard_mm")}
+    for name in ("expanded_mm", "expanded_deg"):
+        figures[name] = getattr(budget, name) if is_evident else None
+    return figures | {"lines": [*map(_line, budget.lines)]}
 
 
 def _line(line: BudgetLine) -> dict[str, Any]:

@@ -71,8 +71,9 @@ def length_statement(
         unit = errors_by_scale(belief, task.poses, task.workspace, known)
         sigma, limits = result.expanded_um_m / COVERAGE_FACTOR, settings.acceptance
         errors = TaskErrors(-result.long_um_m * unit, sigma * unit[..., np.newaxis])
-        error = JudgedError.of(errors.position, limits.position_mm, limits.guard_band_factor)
-    verdict = error.verdict if error is not None and result.is_consistent else Verdict.NOT_EVALUATED
+        limit = limits.position_mm, limits.guard_band_factor
+        error = JudgedError.of(errors.position, *limit, is_evident=result.is_consistent)
+    verdict = Verdict.NOT_EVALUATED if error is None else error.verdict
     return LengthStatement(verdict=verdict, result=result, error=error)
 
 

@@ -162,7 +162,8 @@ def verify(settings: CellSettings, robot: Robot, found: Identification, held_out
     budget = task.budget(updated, belief, robot.effects, robot.known_effects)
     accuracy = None
     if budget is not None:
-        accuracy = _verified_accuracy(settings, robot, found, updated, task, budget, held_out.length)
+        about = settings, robot, found, updated, task, budget, held_out.length
+        accuracy = _verified_accuracy(*about, is_evident=all(test.passed for test in tests))
     if accuracy is not None and (length := accuracy.length) is not None:
         sentence = "The records of the length check agree with each other."
         if not length.is_consistent:
@@ -205,6 +206,8 @@ def _verified_accuracy(
     task: Task,
     budget: UncertaintyBudget,
     measured: LengthMeasurements | None,
+    *,
+    is_evident: bool,
 ) -> VerifiedAccuracy:
     """The error that the geometry of ``found`` makes at the task poses, by the updated estimate."""
     belief, length = robot.belief(updated), None
@@ -225,6 +228,7 @@ def _verified_accuracy(
         settings,
         robot,
         task,
+        is_evident=is_evident and (length is None or length.is_consistent),
         of_geometry=budget.errors_of(difference, of_geometry=True) if budget.scatters else None,
         alone=errors_of_geometry_alone(settings, robot, updated),
         length=length,

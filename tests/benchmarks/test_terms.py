@@ -29,7 +29,14 @@ from tests.benchmarks.machines import on_all_cores
 from tests.benchmarks.samples import sample
 from tests.benchmarks.worlds import budgets
 from tests.benchmarks.worlds.not_geometry import NEWTON, effect_of, terms_of
-from tests.benchmarks.worlds.trials import HELD_OUT_FROM, LIMIT_MM, records_after, settings, stated_limit
+from tests.benchmarks.worlds.trials import (
+    HELD_OUT_FROM,
+    LIMIT_MM,
+    figures_of,
+    records_after,
+    settings,
+    stated_limit,
+)
 from tests.benchmarks.worlds.world import World
 
 MACHINES = sample(__name__, "MACHINES")
@@ -143,13 +150,11 @@ def carried_out(machine: Machine, number: int) -> Outcome:
     belief = after.belief(found)
     task = Task.of(own.cell.settings, after, belief).reachable(belief)
     errors = corrected.errors(found.geometry, task.poses, task.workspace, hour)
-    accuracy = says.accuracy
     at_loaded = np.linalg.norm(errors.once, axis=-1)[is_loaded(after, found, task.poses)]
     return Outcome(
         errors.largest_once_mm,
         float(at_loaded.max(initial=0.0)),
-        np.nan if accuracy is None else accuracy.position.value,
-        np.nan if accuracy is None else accuracy.position.expanded,
+        *figures_of(says.accuracy),
         says.verdict,
         () if found.terms is None else tuple(term.name for term in found.terms.terms),
         any(not test.passed for test in says.tests),

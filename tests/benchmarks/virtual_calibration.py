@@ -31,6 +31,7 @@ from hexacell.verdict.verification import HeldOut, Verification, verify
 from procedures.calibration.held_out_poses import HeldOutPoses
 from procedures.run.keys import SixNumbers
 from tests.benchmarks.worlds.effects import Effect
+from tests.benchmarks.worlds.trials import figures_of
 from tests.benchmarks.worlds.world import World
 
 HELD_OUT_FROM, AFTER_FROM, CONFIRMING_FROM = 100, 200, 300
@@ -152,15 +153,14 @@ def judged(
     task = Task.of(cell.settings, after, belief).reachable(belief)
     position, turned = says.accuracy.position, says.accuracy.orientation
     if not reason and turned.verdict is not Verdict.PASS:
-        reason = f"orientation {turned.value:.3f} +- {turned.expanded:.3f} deg"
+        reason = f"orientation {turned.with_u('deg')}"
     return Judged(
         truth,
         done,
         says.verdict,
         is_refused,
         true_error(after, truth, found, task),
-        position.value,
-        position.expanded,
+        *figures_of(says.accuracy),
         position.limit,
         done.outside,
         reason,

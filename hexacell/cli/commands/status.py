@@ -175,7 +175,8 @@ def _samples(one: cell_status.CellStatus) -> Iterator[tuple[str, dict[str, str],
         yield "hexacell_last_verdict", {"verdict": each.value}, str(int(each is verdict))
     if position is not None:
         yield "hexacell_position_error_mm", {}, repr(position.value)
-        yield "hexacell_position_expanded_mm", {}, repr(position.expanded)
+        if position.expanded is not None:
+            yield "hexacell_position_expanded_mm", {}, repr(position.expanded)
         yield "hexacell_position_limit_mm", {}, repr(position.limit)
 
 

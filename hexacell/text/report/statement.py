@@ -47,7 +47,7 @@ def statement_chapter(run: ReportedRun) -> Chapter:
         (
             f"{name}, {shown.name}",
             shown.number(one.value),
-            shown.number(one.expanded),
+            "not stated" if one.expanded is None else shown.number(one.expanded),
             shown.limit(one.limit),
             one.verdict.value,
         )
@@ -142,8 +142,9 @@ def decision_rule(accuracy: VerifiedAccuracy | None) -> str:
         f"Decision rule: pass if error + {band} is at most the limit, fail if error - {band} is above it, "
         "conditional in between (guard band as in ILAC-G8). The error is the largest in one round of "
         "visits to all task poses, and U its expanded uncertainty, which holds in 95 of 100 cases "
-        f"(k = {COVERAGE_FACTOR:g}). In the terms of ISO 9283 it has pose accuracy and pose repeatability "
-        "together, the latter as far as it was stated or measured."
+        f"(k = {COVERAGE_FACTOR:g}), and is not stated where the records contradict the model. In the "
+        "terms of ISO 9283 the error has pose accuracy and pose repeatability together, "
+        "the latter as far as it was stated or measured."
     )
 
 

@@ -13,7 +13,7 @@ from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import GaugeFaultError, Identification
 from hexacell.measurements.records import MeasurementSet
-from hexacell.verdict.decision import Verdict
+from hexacell.verdict.decision import Verdict, VerifiedAccuracy
 from hexacell.verdict.verification import HeldOut, Verification, verify
 from tests.benchmarks.worlds import budgets
 from tests.benchmarks.worlds.campaigns import Setting, UnreachableError, setting
@@ -124,10 +124,17 @@ def _judged(trial: Trial, world: World, found: Identification) -> Outcome:
         says.verdict,
         errors.largest_mm,
         errors.largest_once_mm,
-        np.nan if accuracy is None else accuracy.position.value,
-        np.nan if accuracy is None else accuracy.position.expanded,
+        *figures_of(accuracy),
         is_wrongly_named=any(fault.kind not in faults for fault in found.data_faults),
     )
+
+
+def figures_of(accuracy: VerifiedAccuracy | None) -> tuple[float, float]:
+    """The largest position error and its U, mm, as they are stated; NaN for what is not."""
+    if accuracy is None:
+        return np.nan, np.nan
+    position = accuracy.position
+    return position.value, np.nan if position.expanded is None else position.expanded
 
 
 def _verified(

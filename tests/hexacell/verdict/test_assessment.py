@@ -16,6 +16,7 @@ from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexag
 from hexacell.kinematics.pose import FrameTransform, Pose, PoseBatch
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import make_robot
+from hexacell.text.identification import identification_report
 from hexacell.verdict.assessment import assess
 from hexacell.verdict.findings import findings, pair_sentences
 from hexacell.verdict.fit_document import fit_document
@@ -72,10 +73,16 @@ def test_a_good_result_has_the_verdict_first_and_then_the_accuracy(good):
 
 
 def test_far_too_much_noise_makes_it_doubtful_and_names_the_levels(visit, assessed_of):
-    verdict, *more = findings(assessed_of(visit(seed=2).measured(0.03, seed=1)))
+    assessed = assessed_of(visit(seed=2).measured(0.03, seed=1))
+    verdict, *more = findings(assessed)
     assert verdict.startswith("Doubtful: the residuals are ")
     assert "times the stated noise" in verdict
     assert any("encoders 0.0" in sentence and "gauges 0.0" in sentence for sentence in more)
+    stated = fit_document(assessed)["uncertainty"]
+    assert (stated["expanded_mm"], stated["expanded_deg"]) == (None, None), "the model is contradicted"
+    report = " ".join(identification_report(assessed).split())
+    assert "U at the task poses is not stated" in report
+    assert "U, 95 %" not in report
 
 
 def test_residuals_that_are_too_large_are_followed_by_what_may_be(visit, assessed_of, good):

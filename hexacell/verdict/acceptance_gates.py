@@ -4,10 +4,14 @@ from collections.abc import Sequence
 from math import inf, isfinite
 
 from hexacell.cell.fields import Frozen
+from hexacell.cell.model import CellSettings
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
 from hexacell.identification.solver.chi_square import CONTRADICTED_RATIO, ChiSquareTest, ChiSquareVerdict
 from hexacell.identification.solver.result import GeometryEstimate
 from hexacell.lengths import shown
+from hexacell.results.result import IdentificationResult
+from hexacell.results.term_result import impossible_terms
+from hexacell.robot.model import Robot
 
 
 class AcceptanceGate(Frozen):
@@ -27,6 +31,29 @@ class AcceptanceGate(Frozen):
     def refuses(self) -> bool:
         """Whether it is not met, and no person can accept that just by agreeing."""
         return not self.passed and (self.needs_cell_name or not self.needs_person)
+
+
+def gates_of_run(
+    settings: CellSettings, robot: Robot, result: IdentificationResult, expired: Sequence[str] | None = None
+) -> tuple[AcceptanceGate, ...]:
+    """The gates of a run, by its result.
+
+    Args:
+        settings: of the cell.
+        robot: with the controller's geometry as it was before.
+        result: of the identification.
+        expired: as in :func:`gates`.
+    """
+    identified = result.estimate(robot.mechanism.parameters)
+    return gates(
+        identified,
+        robot.tolerance_violations(identified),
+        residuals=result.residuals,
+        change_mm=robot.largest_change(identified.geometry),
+        largest_change_mm=settings.acceptance.largest_change_mm,
+        expired=expired,
+        impossible=impossible_terms(robot.terms, result.terms),
+    )
 
 
 def gates(

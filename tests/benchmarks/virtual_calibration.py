@@ -25,13 +25,12 @@ from hexacell.noise.repeats import Repeats
 from hexacell.results.written_geometry import as_written
 from hexacell.robot.model import Robot, make_robot
 from hexacell.robot.virtual_robot import VirtualRobot, random_robot
-from hexacell.verdict.acceptance_gates import gates
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.verification import HeldOut, Verification, verify
 from procedures.calibration.held_out_poses import HeldOutPoses
 from procedures.run.keys import SixNumbers
 from tests.benchmarks.worlds.effects import Effect
-from tests.benchmarks.worlds.trials import figures_of
+from tests.benchmarks.worlds.trials import figures_of, unmet_gates
 from tests.benchmarks.worlds.world import World
 
 HELD_OUT_FROM, AFTER_FROM, CONFIRMING_FROM = 100, 200, 300
@@ -92,6 +91,11 @@ class Judged:
         return self.verdict is Verdict.PASS and not self.unmet
 
     @property
+    def is_stated(self) -> bool:
+        """Whether U is stated: not where the evidence failed, or nothing could be judged."""
+        return bool(np.isfinite(self.u_mm))
+
+    @property
     def is_covered(self) -> bool:
         """Whether the true error is within U of the stated one."""
         return abs(self.value_mm - self.true_mm) <= self.u_mm
@@ -135,14 +139,7 @@ def judged(
         return Judged(truth, reason=str(failed))
     found, after, says = done.found, done.after, done.verification
     is_refused = bool(robot.tolerance_violations(found.estimate))
-    conditions = gates(
-        found.estimate,
-        robot.tolerance_violations(found.estimate),
-        residuals=found.goodness,
-        change_mm=robot.largest_change(found.geometry),
-        largest_change_mm=cell.settings.acceptance.largest_change_mm,
-    )
-    unmet = tuple(one.sentence for one in conditions if not one.passed)
+    unmet = unmet_gates(cell.settings, robot, found)
     reason = ", ".join(test.sentence for test in says.tests if not test.passed)
     if says.accuracy is None:
         reason = reason or "no accuracy"

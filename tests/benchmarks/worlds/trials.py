@@ -13,6 +13,9 @@ from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import GaugeFaultError, Identification
 from hexacell.measurements.records import MeasurementSet
+from hexacell.results.result import IdentificationResult
+from hexacell.robot.model import Robot
+from hexacell.verdict.acceptance_gates import gates_of_run
 from hexacell.verdict.decision import Verdict, VerifiedAccuracy
 from hexacell.verdict.verification import HeldOut, Verification, verify
 from tests.benchmarks.worlds import budgets
@@ -56,6 +59,7 @@ class Outcome:
         once_mm: the largest error of one visit of each.
         value_mm: what is stated of it, and its ``u_mm``.
         is_wrongly_named: whether a data fault was said to be in the records that is not in this world.
+        unmet: see :func:`unmet_gates`.
     """
 
     trial: Trial
@@ -65,6 +69,17 @@ class Outcome:
     value_mm: float = np.nan
     u_mm: float = np.nan
     is_wrongly_named: bool = False
+    unmet: tuple[str, ...] = ()
+
+    @property
+    def is_accepted(self) -> bool:
+        """Whether a run writes it without a person, and it passes."""
+        return self.verdict is Verdict.PASS and not self.unmet
+
+    @property
+    def is_stated(self) -> bool:
+        """Whether U is stated: not where the evidence failed, or nothing could be judged."""
+        return bool(np.isfinite(self.u_mm))
 
     @property
     def is_covered(self) -> bool:
@@ -114,7 +129,7 @@ def _judged(trial: Trial, world: World, found: Identification) -> Outcome:
     own, stated = settings()[trial.number % ROBOTS], stated_limit(trial.limit_mm, trial.grade)
     written = world.robot.with_controller(world.robot.for_controller(found.geometry))
     hour = world.hours(own.commands, world.robot.commanding)
-    says = _verified(stated, replace(world, robot=written), found, own, hour)
+    says = verified(stated, replace(world, robot=written), found, own, hour)
     belief = written.belief(found)
     task = Task.of(stated, written, belief).reachable(belief)
     errors = world.errors(found.geometry, task.poses, task.workspace, hour)
@@ -126,7 +141,17 @@ def _judged(trial: Trial, world: World, found: Identification) -> Outcome:
         errors.largest_once_mm,
         *figures_of(accuracy),
         is_wrongly_named=any(fault.kind not in faults for fault in found.data_faults),
+        unmet=unmet_gates(stated, world.robot, found),
     )
+
+
+def unmet_gates(settings: CellSettings, robot: Robot, found: Identification) -> tuple[str, ...]:
+    """The gates of a run that a result does not meet, in words: it then waits for a person, or is refused.
+
+    No instrument here has a certificate, which could have expired. ``robot`` is as before the result.
+    """
+    result = IdentificationResult.of(found, robot.identified_zeros(found))
+    return tuple(gate.sentence for gate in gates_of_run(settings, robot, result) if not gate.passed)
 
 
 def figures_of(accuracy: VerifiedAccuracy | None) -> tuple[float, float]:
@@ -137,7 +162,7 @@ def figures_of(accuracy: VerifiedAccuracy | None) -> tuple[float, float]:
     return position.value, np.nan if position.expanded is None else position.expanded
 
 
-def _verified(
+def verified(
     settings: CellSettings, world: World, found: Identification, own: Setting, hour: float
 ) -> Verification:
     """By held-out records, and where a test of the model fails narrowly by confirming ones after them."""

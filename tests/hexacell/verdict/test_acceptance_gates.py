@@ -11,11 +11,16 @@ from hexacell.identification.diagnostics.tolerance_check import tolerance_violat
 from hexacell.identification.problem.prior import Noise, Tolerances
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.result import Termination
+from hexacell.identification.terms.finding import Finding
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.lengths import shown
-from hexacell.verdict.acceptance_gates import gates
+from hexacell.results.result import IdentificationResult
+from hexacell.results.term_result import TermResult
+from hexacell.robot.model import robot_of
+from hexacell.verdict.acceptance_gates import gates, gates_of_run
 from hexacell.verdict.verification import DeviationStatistics, is_worse
+from tests.benchmarks.worlds.trials import unmet_gates
 
 TOLERANCES = Tolerances({"S": 7.0, "B": 7.0, "l": 7.0})
 
@@ -175,3 +180,22 @@ def test_an_expired_certificate_needs_a_person(judged):
     gate = judged(expired=("gauge x", "encoders"))["certified"]
     assert (gate.passed, gate.needs_person, gate.needs_cell_name) == (False, True, False)
     assert gate.sentence == "The certificate has expired: gauge x, encoders."
+
+
+def test_benchmarks_count_what_every_gate_of_a_run_holds(bundled_cell, identified):
+    """One function has them all; a coefficient that no machine has is refused there as well."""
+    robot = robot_of(bundled_cell)
+    settings, result = bundled_cell.settings, IdentificationResult.of(identified)
+    assert unmet_gates(settings, robot, identified) == ()
+    below = TermResult(
+        name="backlash", finding=Finding.TAKEN, log_factor=9.0, values=(-1.0,) * 6, sigma=(0.01,) * 6
+    )
+    of_run = gates_of_run(settings, robot, result.model_copy(update={"terms": (below,)}), ["gauge x"])
+    assert {gate.name: gate.passed for gate in of_run} == {
+        "converged": True,
+        "agrees with the noise": True,
+        "within tolerance": True,
+        "small change": True,
+        "physical": False,
+        "certified": False,
+    }

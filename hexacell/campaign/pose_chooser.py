@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from hexacell.campaign.pose_list import PoseList
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.design import candidates
+from hexacell.design.arrival_sides import with_best_sides
 from hexacell.design.candidates import Amplitudes
 from hexacell.design.criteria import D_OPTIMAL, Criterion
 from hexacell.design.pose_selection import SelectedPose, select_from_list, select_pose
@@ -23,6 +25,8 @@ from hexacell.kinematics import rotations
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.limits.limits import Limits
+from hexacell.motion.arrival import least_way
+from hexacell.motion.overshoot import overshoot
 from hexacell.motion.paths import PathPlanner, find_route
 from hexacell.robot.model import Robot
 
@@ -124,7 +128,15 @@ class PoseChooser:
         known_then = self.known_then(belief, state) if well_known and self.known_then else None
         refinement = self.effort.refinement(len(state.measurements))
         rounds = () if most < np.pi else refinement  # which would turn candidates further
-        return select_pose(planner, zero, turns, self._criterion(belief), known_then, rounds)
+        criterion = self._criterion(belief)
+        selected = select_pose(planner, zero, turns, criterion, known_then, rounds)
+        return with_best_sides(planner, zero, selected, self._back, criterion, known_then)
+
+    @cached_property
+    def _back(self) -> float:
+        """How far joints stand beside their places before a stop; 0 where all stops have one side."""
+        least = least_way(self.settings.mechanism.words.joint_unit, self.robot.noise.stops)
+        return 0.0 if self.settings.motion.sign else overshoot(least, self.settings.model.backlash)
 
     def _turns(
         self, limits: Limits, state: CampaignState, well_known: bool, most: float, tilt_share: float

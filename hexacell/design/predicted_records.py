@@ -156,9 +156,15 @@ class PredictedRecords(Batch):
         return is_within & limits.within_travel(self.deviation, stopped, TRAVEL_SHARE)
 
 
-def predict_records(belief: RobotBelief, zero: GaugeZero, targets: ReachableTargets) -> PredictedRecords:
-    """The records of some targets at a point whose gauges were zeroed at ``zero``."""
-    derivatives = position_derivatives(belief, targets, zero.directions_to(targets))
+def predict_records(
+    belief: RobotBelief, zero: GaugeZero, targets: ReachableTargets, directions: Array | None = None
+) -> PredictedRecords:
+    """The records of n targets at a point whose gauges were zeroed at ``zero``.
+
+    Joints arrive from ``directions`` (n, 6); None: straight from where the robot is.
+    """
+    directions = zero.directions_to(targets) if directions is None else directions
+    derivatives = position_derivatives(belief, targets, directions)
     return _predicted(belief, zero, targets, *derivatives)
 
 

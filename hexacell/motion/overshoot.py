@@ -30,13 +30,14 @@ def overshoot(least: float, backlash: float) -> float:
     return SPARE * max(least, BACKLASH_SIGMAS * backlash)
 
 
-def waypoint_before(belief: RobotBelief, stop: PoseBatch, back: float) -> PoseBatch | None:
+def waypoint_before(belief: RobotBelief, stop: PoseBatch, back: float | Array) -> PoseBatch | None:
     """The command (1) at which every joint stands short of a stop (1); None if there is none.
 
     Args:
         belief: what is known of the robot.
         stop: a command.
-        back: by how much its joints go up from the waypoint to the stop; below 0 if they go down.
+        back: by how much its joints, or each of them (6,), go up from the waypoint to the stop; below 0 if
+            they go down.
     """
     joints = belief.commanded.joints(stop)
     if not np.isfinite(joints).all():
@@ -53,7 +54,11 @@ def waypoint_before(belief: RobotBelief, stop: PoseBatch, back: float) -> PoseBa
 
 
 def clear_waypoint_before(
-    belief: RobotBelief, start: PoseBatch | None, stop: PoseBatch, back: float, reference: Array | None
+    belief: RobotBelief,
+    start: PoseBatch | None,
+    stop: PoseBatch,
+    back: float | Array,
+    reference: Array | None,
 ) -> PoseBatch | None:
     """The waypoint before a stop if the way over it keeps the limits and the gauges' travel; else None.
 

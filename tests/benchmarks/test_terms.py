@@ -26,16 +26,8 @@ from hexacell.verdict.decision import Verdict
 from tests.benchmarks.figures import NEVER, at_least, at_most, least_by_chance
 from tests.benchmarks.machines import on_all_cores
 from tests.benchmarks.samples import sample
-from tests.benchmarks.worlds import budgets
+from tests.benchmarks.worlds import budgets, trials
 from tests.benchmarks.worlds.not_geometry import NEWTON, effect_of, terms_of
-from tests.benchmarks.worlds.trials import (
-    LIMIT_MM,
-    figures_of,
-    settings,
-    stated_limit,
-    unmet_gates,
-    verified,
-)
 from tests.benchmarks.worlds.world import World
 
 MACHINES = sample(__name__, "MACHINES")
@@ -84,11 +76,11 @@ MACHINES_OF_A_KIND = {
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Outcome(trials.Stated):
     """What came of a machine: its true error, as stated, and which terms were taken.
 
     ``loaded_mm`` is the true error at those task poses at which it is known on which side each leg lies;
-    ``is_doubted``: a test of the model failed, so that no U is stated. ``unmet``: see :func:`.unmet_gates`.
+    ``unmet``: see :func:`.unmet_gates`.
     """
 
     true_mm: float = np.nan
@@ -97,13 +89,7 @@ class Outcome:
     u_mm: float = np.nan
     verdict: Verdict | None = None
     taken: tuple[str, ...] = ()
-    is_doubted: bool = False
     unmet: tuple[str, ...] = ()
-
-    @property
-    def is_accepted(self) -> bool:
-        """Whether a run writes it without a person, and it passes."""
-        return self.verdict is Verdict.PASS and not self.unmet
 
 
 def sent_further(
@@ -134,7 +120,7 @@ def is_loaded(robot: Robot, found: Identification, poses: PoseBatch) -> Array:
 
 def carried_out(machine: Machine, number: int) -> Outcome:
     coefficients = machine.drawn(np.random.default_rng([38, number]))
-    every = settings(CANDIDATES, tuple(name for name, sizes in coefficients.items() if sizes.any()))
+    every = trials.settings(CANDIDATES, tuple(name for name, sizes in coefficients.items() if sizes.any()))
     own = every[number % len(every)]
     offered = terms_of(own.robot, newton=machine.stated_n)
     terms = tuple(term for term in offered if term.name in machine.looked_for)
@@ -147,7 +133,7 @@ def carried_out(machine: Machine, number: int) -> Outcome:
         after = replace(written, corrections=corrections or NO_CORRECTIONS)
         corrected = replace(world, robot=after, sent_further=partial(sent_further, after, found))
         hour = world.hours(own.commands, robot.commanding)
-        says = verified(stated_limit(LIMIT_MM), corrected, found, own, hour)
+        says = trials.verified(trials.stated_limit(trials.LIMIT_MM), corrected, found, own, hour)
     except HexacellError:
         return Outcome()
     belief = after.belief(found)
@@ -157,11 +143,10 @@ def carried_out(machine: Machine, number: int) -> Outcome:
     return Outcome(
         errors.largest_once_mm,
         float(at_loaded.max(initial=0.0)),
-        *figures_of(says.accuracy),
+        *trials.figures_of(says.accuracy),
         says.verdict,
         () if found.terms is None else tuple(term.name for term in found.terms.terms),
-        any(not test.passed for test in says.tests),
-        unmet_gates(own.cell.settings, robot, found),
+        trials.unmet_gates(own.cell.settings, robot, found),
     )
 
 
@@ -185,11 +170,11 @@ def test_what_is_not_geometry_is_found_and_corrected(figure, perfect, kind: str)
     passes = sum(one.is_accepted for one in every)
     figure("passes", passes, f"of {MACHINES}")
     figure("a gate holds the write back", sum(bool(one.unmet) for one in every), f"of {MACHINES}")
-    figure("a test of the model fails", sum(one.is_doubted for one in every), f"of {MACHINES}")
-    stated = [one for one in known if np.isfinite(one.u_mm)]
+    stated = [one for one in known if one.is_stated]
+    figure("a test of the model fails", len(known) - len(stated), f"of {MACHINES}")
     covered = sum(abs(one.value_mm - one.true_mm) <= one.u_mm for one in stated)
     figure("U covers", covered, f"of {len(stated)}", at_least(least_by_chance(0.93, len(stated))))
-    false = sum(one.verdict is Verdict.PASS and one.true_mm > LIMIT_MM for one in known)
+    false = sum(one.verdict is Verdict.PASS and one.true_mm > trials.LIMIT_MM for one in known)
     figure("false passes", false, "", NEVER)
     if is_perfect:
         taken = sum(bool(one.taken) for one in every)

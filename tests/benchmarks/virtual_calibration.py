@@ -30,7 +30,7 @@ from hexacell.verdict.verification import HeldOut, Verification, verify
 from procedures.calibration.held_out_poses import HeldOutPoses
 from procedures.run.keys import SixNumbers
 from tests.benchmarks.worlds.effects import Effect
-from tests.benchmarks.worlds.trials import figures_of, unmet_gates
+from tests.benchmarks.worlds.trials import Stated, figures_of, unmet_gates
 from tests.benchmarks.worlds.world import World
 
 HELD_OUT_FROM, AFTER_FROM, CONFIRMING_FROM = 100, 200, 300
@@ -65,7 +65,7 @@ class VirtualCalibration:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Judged:
+class Judged(Stated):
     """What was stated of a calibration's result, and what is true of it.
 
     ``reason``: where no result was verified, a test of the model failed, or the orientation does not pass.
@@ -84,16 +84,6 @@ class Judged:
     outside: int = 0
     reason: str = ""
     unmet: tuple[str, ...] = ()
-
-    @property
-    def is_accepted(self) -> bool:
-        """Whether a run writes it without a person, and it passes."""
-        return self.verdict is Verdict.PASS and not self.unmet
-
-    @property
-    def is_stated(self) -> bool:
-        """Whether U is stated: not where the evidence failed, or nothing could be judged."""
-        return bool(np.isfinite(self.u_mm))
 
     @property
     def is_covered(self) -> bool:
@@ -141,28 +131,18 @@ def judged(
     is_refused = bool(robot.tolerance_violations(found.estimate))
     unmet = unmet_gates(cell.settings, robot, found)
     reason = ", ".join(test.sentence for test in says.tests if not test.passed)
+    true_mm = np.nan
     if says.accuracy is None:
         reason = reason or "no accuracy"
-        return Judged(
-            truth, done, says.verdict, is_refused, outside=done.outside, reason=reason, unmet=unmet
-        )
-    belief = after.belief(found)
-    task = Task.of(cell.settings, after, belief).reachable(belief)
-    position, turned = says.accuracy.position, says.accuracy.orientation
-    if not reason and turned.verdict is not Verdict.PASS:
-        reason = f"orientation {turned.with_u('deg')}"
-    return Judged(
-        truth,
-        done,
-        says.verdict,
-        is_refused,
-        true_error(after, truth, found, task),
-        *figures_of(says.accuracy),
-        position.limit,
-        done.outside,
-        reason,
-        unmet,
-    )
+    else:
+        belief, turned = after.belief(found), says.accuracy.orientation
+        task = Task.of(cell.settings, after, belief).reachable(belief)
+        true_mm = true_error(after, truth, found, task)
+        if not reason and turned.verdict is not Verdict.PASS:
+            reason = f"orientation {turned.with_u('deg')}"
+    stated, limit = figures_of(says.accuracy), cell.settings.acceptance.position_mm
+    outcome = is_refused, true_mm, *stated, limit, done.outside, reason, unmet
+    return Judged(truth, done, says.verdict, *outcome)
 
 
 def robot_that_reaches(cell: Cell, robot: Robot, random: np.random.Generator) -> Geometry:

@@ -49,8 +49,26 @@ class Trial:
     limit_mm: float = LIMIT_MM
 
 
+class Stated:
+    """What is stated of a result: verdict, U, and the gates of a run that it does not meet, in words."""
+
+    verdict: Verdict | None
+    u_mm: float
+    unmet: tuple[str, ...]
+
+    @property
+    def is_stated(self) -> bool:
+        """Whether U is stated: not where the evidence failed, or nothing could be judged."""
+        return bool(np.isfinite(self.u_mm))
+
+    @property
+    def is_accepted(self) -> bool:
+        """Whether a run writes it without a person, and it passes."""
+        return self.verdict is Verdict.PASS and not self.unmet
+
+
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class Outcome(Stated):
     """What came of a trial.
 
     Attributes:
@@ -70,16 +88,6 @@ class Outcome:
     u_mm: float = np.nan
     is_wrongly_named: bool = False
     unmet: tuple[str, ...] = ()
-
-    @property
-    def is_accepted(self) -> bool:
-        """Whether a run writes it without a person, and it passes."""
-        return self.verdict is Verdict.PASS and not self.unmet
-
-    @property
-    def is_stated(self) -> bool:
-        """Whether U is stated: not where the evidence failed, or nothing could be judged."""
-        return bool(np.isfinite(self.u_mm))
 
     @property
     def is_covered(self) -> bool:

@@ -20,55 +20,41 @@ from hexacell.motion.paths import PathPlanner
 from hexacell.robot.model import robot_of
 
 BACK = 0.45
-POSES = 7
 
 
 @pytest.fixture(scope="module")
-def robot(bundled_cell):
-    return robot_of(bundled_cell)
+def known(bundled_cell):
+    """A robot as drawn, known to a tenth of the tolerances, with backlash; and poses as they come."""
+    robot, points = robot_of(bundled_cell), bundled_cell.settings.identification.points[:3]
+    terms = TermEstimates.expected((backlash(0.1),), len(robot.free_parameters))
+    belief = replace(robot.belief(), covariance=0.01 * robot.belief().covariance, terms=terms)
+    return belief, select_sets(
+        belief, robot.from_commands(Pose(*one) for one in points).positions, 7, 1, 64
+    )
 
 
-def with_terms(robot, *terms):
-    """A robot that is as drawn, which is known to a tenth of the tolerances."""
-    belief, free = robot.belief(), robot.free_parameters
-    known = replace(belief, covariance=0.01 * belief.covariance)
-    return replace(known, terms=TermEstimates.expected(terms, len(free)) if terms else None)
-
-
-@pytest.fixture(scope="module")
-def sets(robot, bundled_cell):
-    """Poses at three points, selected as they come for a robot with backlash."""
-    points = robot.from_commands(Pose(*one) for one in bundled_cell.settings.identification.points[:3])
-    return select_sets(with_terms(robot, backlash(0.1)), points.positions, POSES, 1, 64)
-
-
-def measured(belief, sets, back=BACK):
+def measured(belief, sets, back):
     """What is known after the records of some sets, and how each pose was reached."""
     chosen = []
     for poses in sets:
         targets = ReachableTargets(poses, belief.mechanism.inverse(belief.estimate, belief.branch, poses))
-        commands, _ = commands_for(belief, targets)
-        own, by_joints = position_derivatives(belief, targets[[0]], np.ones((1, 6)))
-        noise = belief.noise.record_covariance(by_joints)[0]
-        zero = GaugeZero(
-            poses.positions[0], poses.rotations[0], targets.joints[0], own[0], noise, targets.joints[0]
-        )
+        commands, first = commands_for(belief, targets)[0], targets[[0]]
+        own, by_joints = position_derivatives(belief, first, np.ones((1, 6)))
+        noise, place = belief.noise.record_covariance(by_joints)[0], poses.positions[0]
         for row in range(1, len(poses)):
-            zero = replace(zero, before=targets.joints[row - 1])
+            before = targets.joints[row - 1]
+            zero = GaugeZero(place, poses.rotations[0], first.joints[0], own[0], noise, before)
+            planner = PathPlanner(belief, commands[[row - 1]], None, place)
             record = predict_records(belief, zero, targets[[row]])
-            one = SelectedPose(commands.pose(row), record, 1.0, ())
-            planner = PathPlanner(belief, commands[[row - 1]], None, zero.reference)
-            one = with_best_sides(planner, zero, one, back)
-            known = covariance_update(
-                belief.joint_covariance, one.record.jacobian[0], one.record.covariance[0]
-            )
-            belief = belief.knowing(known)
-            chosen.append(one)
+            straight = SelectedPose(commands.pose(row), record, 1.0, ())
+            chosen.append(with_best_sides(planner, zero, straight, back))
+            shown = chosen[-1].record.jacobian[0], chosen[-1].record.covariance[0]
+            belief = belief.knowing(covariance_update(belief.joint_covariance, *shown))
     return belief, chosen
 
 
-def test_as_many_records_tell_more_of_backlash_by_sides_that_are_chosen(robot, sets):
-    belief = with_terms(robot, backlash(0.1))
+def test_as_many_records_tell_more_of_backlash_by_sides_that_are_chosen(known):
+    belief, sets = known
     (as_they_come, straight), (by_choice, chosen) = (measured(belief, sets, back) for back in (0.0, BACK))
     assert not any(one.waypoints for one in straight)
     (_, come), (_, sigma) = (one.terms.of("backlash") for one in (as_they_come, by_choice))
@@ -77,13 +63,13 @@ def test_as_many_records_tell_more_of_backlash_by_sides_that_are_chosen(robot, s
     over = [one for one in chosen if one.waypoints]
     assert 0.2 * len(chosen) < len(over) < len(chosen), "a waypoint only where it gains"
     for one in over:
-        (waypoint,) = one.waypoints
-        ways = np.subtract(*(belief.commanded.joints(PoseBatch.of([p])) for p in (one.command, waypoint)))
+        ends = (PoseBatch.of([pose]) for pose in (one.command, *one.waypoints))
+        ways = np.subtract(*map(belief.commanded.joints, ends))
         assert np.abs(ways) == pytest.approx(np.full((1, 6), BACK), abs=1e-9)
 
 
-def test_where_no_backlash_is_looked_for_every_pose_is_reached_straight(robot, sets):
-    down = play(0.1, Weight(np.array([0.0, 0.0, -1.0])))
-    for belief in (with_terms(robot), with_terms(robot, down)):
-        _, chosen = measured(belief, sets[:1])
-        assert not any(one.waypoints for one in chosen)
+def test_where_no_backlash_is_looked_for_every_pose_is_reached_straight(known):
+    belief, sets = known
+    clearance = play(0.1, Weight(np.array([0.0, 0.0, -1.0])))
+    for terms in (None, TermEstimates.expected((clearance,), len(belief.free))):
+        assert not any(one.waypoints for one in measured(replace(belief, terms=terms), sets[:1], BACK)[1])

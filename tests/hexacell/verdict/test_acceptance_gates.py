@@ -182,20 +182,12 @@ def test_an_expired_certificate_needs_a_person(judged):
     assert gate.sentence == "The certificate has expired: gauge x, encoders."
 
 
-def test_benchmarks_count_what_every_gate_of_a_run_holds(bundled_cell, identified):
-    """One function has them all; a coefficient that no machine has is refused there as well."""
-    robot = robot_of(bundled_cell)
-    settings, result = bundled_cell.settings, IdentificationResult.of(identified)
+def test_benchmarks_count_by_every_gate_of_a_run(bundled_cell, identified):
+    robot, settings = robot_of(bundled_cell), bundled_cell.settings
     assert unmet_gates(settings, robot, identified) == ()
     below = TermResult(
         name="backlash", finding=Finding.TAKEN, log_factor=9.0, values=(-1.0,) * 6, sigma=(0.01,) * 6
     )
-    of_run = gates_of_run(settings, robot, result.model_copy(update={"terms": (below,)}), ["gauge x"])
-    assert {gate.name: gate.passed for gate in of_run} == {
-        "converged": True,
-        "agrees with the noise": True,
-        "within tolerance": True,
-        "small change": True,
-        "physical": False,
-        "certified": False,
-    }
+    result = IdentificationResult.of(identified).model_copy(update={"terms": (below,)})
+    unmet = [gate.name for gate in gates_of_run(settings, robot, result, ["gauge x"]) if not gate.passed]
+    assert unmet == ["physical", "certified"]

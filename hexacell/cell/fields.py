@@ -26,6 +26,9 @@ from hexacell.storage.toml_document import MASK
 LARGEST_NUMBER = 1e6
 """Largest number in a cell file or a measurement file: a kilometre, eleven days."""
 
+LARGEST_TIME_S = 1e11
+"""Largest time of a record, from the year 1970 or any other moment."""
+
 SMALLEST_NUMBER = 1e-9
 """Smallest number that must not be zero: a millionth of a nanometre."""
 

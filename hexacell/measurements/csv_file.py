@@ -15,7 +15,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from hexacell.cell.fields import LARGEST_NUMBER
+from hexacell.cell.fields import LARGEST_NUMBER, LARGEST_TIME_S
 from hexacell.errors import FileError
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import Directions, MeasurementSet, Record, RecordId, Temperatures
@@ -123,7 +123,7 @@ def _records(path: Path, text: str, wanted: tuple[str, ...]) -> dict[RecordId, t
         found[record.id] = (line, record)
         if record.time_s is not None:
             if record.time_s < (before := latest.get(record.point, record.time_s)):
-                problem = f"{TIME} is {record.time_s:g}, before {before:g} in an earlier row of this point"
+                problem = f"{TIME} is {record.time_s}, before {before} in an earlier row of this point"
                 action = "Put the rows into the order in which they were measured, or correct this cell"
                 raise FileError(problem, subject=path, line=line, action=action)
             latest[record.point] = record.time_s
@@ -196,16 +196,16 @@ def _temperatures(path: Path, line: int, cells: Mapping[str, str]) -> Temperatur
 
 def _number(path: Path, line: int, name: str, cell: str) -> float:
     """The number in one cell of the column ``name``."""
-    is_count = name in COUNTS
+    is_count, largest = name in COUNTS, LARGEST_TIME_S if name == TIME else LARGEST_NUMBER
     try:
         number = int(cell) if is_count else float(cell)
     except ValueError:
         number = math.nan
     # Python accepts underscores and digits of any script in numbers; a CSV file must not have them.
     is_plain = cell.isascii() and "_" not in cell
-    if is_plain and (1 <= number <= LARGEST_COUNT if is_count else abs(number) <= LARGEST_NUMBER):
+    if is_plain and (1 <= number <= LARGEST_COUNT if is_count else abs(number) <= largest):
         return number
-    expected = "a finite number" if math.isnan(number) else f"a finite number within +-{LARGEST_NUMBER:g}"
+    expected = "a finite number" if math.isnan(number) else f"a finite number within +-{largest:g}"
     if is_count:
         expected = f"a whole number from 1 to {LARGEST_COUNT}"
     found = f'"{shortened(cell)}"' if cell.strip() else "empty"

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from hexacell.campaign.pilots import FIRST_PILOT, MOST_TO_A_LIST, pilot_number
-from hexacell.cell.fields import LARGEST_NUMBER, GeometryDocument, SixNumbers
+from hexacell.cell.fields import LARGEST_NUMBER, LARGEST_TIME_S, GeometryDocument, SixNumbers
 from hexacell.cell.measuring import MOST_POINTS, MOST_POSES
 from hexacell.cell.model import CellSettings
 from hexacell.errors import FileError
@@ -160,7 +160,9 @@ class _Event:
     def _numbers(self) -> Iterator[str]:
         event = self.event
         if isinstance(event, ANY_NUMBERS):
-            yield from _out_of_range(event.model_dump(), LARGEST_NUMBER, but=("counts", "forecasts"))
+            yield from _out_of_range(
+                event.model_dump(), LARGEST_NUMBER, but=("counts", "forecasts", "at_s")
+            )
         step = event.step if isinstance(event, events.StepBegun) else None
         if isinstance(step, Move | Place | Sample | Pilot):
             yield from _out_of_range(step.pose, LARGEST_NUMBER)
@@ -169,6 +171,8 @@ class _Event:
         is_round = all(len(one) == LEGS and max(map(abs, one)) <= LARGEST_COUNT for one in counts)
         if reading is not None and not (counts and is_round):
             yield "the encoders have other counts"
+        if (at_s := getattr(reading, "at_s", None)) is not None and not 0.0 <= at_s <= LARGEST_TIME_S:
+            yield "a reading has no time of a run"
 
     def _content(self) -> Iterator[str]:
         match self.event:

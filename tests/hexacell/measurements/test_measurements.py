@@ -82,11 +82,11 @@ def test_temperatures_are_read_of_the_parts_that_the_file_has(read):
         read("\n".join(lines).replace("-3.25", "warm"))
 
 
-def test_times_are_those_of_a_point_and_do_not_go_back(read):
-    lines = [f"{HEADER},time_s", *(f"{row},{s}" for row, s in zip(ROWS, (90, 3690.5, "", 4), strict=True))]
-    np.testing.assert_array_equal(read("\n".join(lines)).times_s, [90.0, 3690.5, np.nan, 4.0])
-    with pytest.raises(FileError, match="time_s is 80, before 90 in an earlier row of this point") as error:
-        read("\n".join(lines).replace("3690.5", "80"))
+def test_times_from_any_moment_do_not_go_back_within_a_point(read):
+    lines = [f"{HEADER},time_s", *(f"{row},{s}" for row, s in zip(ROWS, (1e9, 2e9, "", 4), strict=True))]
+    np.testing.assert_array_equal(read("\n".join(lines)).times_s, [1e9, 2e9, np.nan, 4.0])
+    with pytest.raises(FileError, match=r"time_s is 80\.0, before 1000000000\.0 in") as error:
+        read("\n".join(lines).replace("2000000000.0", "80"))
     assert error.value.line == 3
 
 

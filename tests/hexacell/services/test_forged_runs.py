@@ -72,6 +72,7 @@ FORGERIES: list[tuple[Forgery, str]] = [
     (lambda h: h.append(pilot_taken(h, FIRST_PILOT + 1)), "pilot pose 2 is not the next one"),
     (lambda h: reading_changed(h, gauges_mm=(float("nan"), 0.0, 0.0)), "nan is not within"),
     (lambda h: reading_changed(h, counts=((1, 2, 3, 4, 5),)), "the encoders have other counts"),
+    (lambda h: reading_changed(h, at_s=-1.0), "no time of a run"),
     (lambda h: result_changed(h, covariance=((1.0,),)), "a covariance has another size"),
     (lambda h: result_changed(h, covariance=((-1.0,) * 42,) * 42), "this is no covariance"),
     (lambda h: h.append(events.Committed(approved_by="me")), "nothing that it follows from"),

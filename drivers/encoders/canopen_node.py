@@ -3,7 +3,7 @@
 The SDO client can be interrupted, and detects a second device under the same node id.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 from canopen.objectdictionary import ObjectDictionary
@@ -152,8 +152,15 @@ def silent_nodes(what: str, legs: Sequence[Leg], remedy: str = THE_NODE) -> Sile
     return error
 
 
-def explained(error: SilentNodeError, nodes: Sequence[EncoderNode], bus: EncoderBus) -> SilentNodeError:
+RESTS = "Read why in its error register (object 1001h), or switch it off and on"
+
+
+def explained(
+    error: SilentNodeError, nodes: Sequence[EncoderNode], bus: EncoderBus, resting: Collection[Leg] = ()
+) -> SilentNodeError:
     """The error with all that are silent now, and advice that fits to those that answer.
+
+    ``resting`` are those whose heartbeat says that they were not started.
 
     Raises ``BusError`` if the bus itself has failed, which explains all.
     """
@@ -170,6 +177,8 @@ def explained(error: SilentNodeError, nodes: Sequence[EncoderNode], bus: Encoder
         return silent_nodes(f"{error.problem}; no encoder answers{bus.reported}", silent, THE_BUS)
     if set(named) & set(silent):
         return silent_nodes(f"{error.problem}; the others answer", silent)
+    if set(named) <= set(resting):
+        return silent_nodes(f"{error.problem}: by its heartbeat it did not start", named, RESTS)
     remedy = THE_BUS if len(named) == len(nodes) else "Check its supply for a dip, timeout_s, heartbeat_ms"
     return silent_nodes(f"{error.problem}, but SDO requests are answered", named, remedy)
 

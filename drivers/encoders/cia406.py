@@ -52,17 +52,19 @@ class EncoderSession(BankSession):
     def start(self) -> None:
         """Configure all nodes, and start them together."""
         self._nodes = tuple(EncoderNode(leg, self.bus, self._settings.timeout_s) for leg in self._legs)
+        self._monitors: tuple[NodeMonitor, ...] = ()
         try:
             self._start()
         except SilentNodeError as error:
-            raise explained(error, self._nodes, self.bus) from error
+            resting = [monitor.leg for monitor in self._monitors if monitor.is_resting]
+            raise explained(error, self._nodes, self.bus, resting) from error
 
     def _start(self) -> None:
         settings, legs, nodes = self._settings, self._legs, self._nodes
         for node in nodes:
             node.command(NmtCommand.ENTER_PRE_OPERATIONAL)
         node_identity.detect_nodes(nodes, self.bus, settings.timeout_s)
-        monitors = tuple(NodeMonitor(leg, self.bus, settings.heartbeat_ms) for leg in legs)
+        self._monitors = monitors = tuple(NodeMonitor(leg, self.bus, settings.heartbeat_ms) for leg in legs)
         device_types = tuple(node_identity.read_device_type(node, settings.unit) for node in nodes)
         self.identities = tuple(map(self._identify, nodes, device_types, monitors))
         channels = tuple(

@@ -73,6 +73,7 @@ class NodeMonitor:
         emergency: the reported error, until the node reports that it is gone.
         action: what to do then.
         emergencies: the number of reported errors.
+        is_resting: its latest heartbeat says that it is not started.
     """
 
     def __init__(self, leg: Leg, bus: EncoderBus, heartbeat_ms: int) -> None:
@@ -81,6 +82,7 @@ class NodeMonitor:
         self.emergency: str | None = None
         self.action = ""
         self.emergencies = 0
+        self.is_resting = False
         self.timeout_s = MAX_MISSED_HEARTBEATS * heartbeat_ms / 1000 + JITTER_S
         self._heartbeat_ms = heartbeat_ms
         self._last_heartbeat: float | None = None
@@ -113,6 +115,7 @@ class NodeMonitor:
         if self._last_heartbeat is not None:
             self._last_heartbeat = time.monotonic()
         state = data[0] & 0x7F if data else BOOT_UP
+        self.is_resting = state != OPERATIONAL
         if state == OPERATIONAL:
             self._was_operational = True
         elif state == BOOT_UP or self._was_operational:

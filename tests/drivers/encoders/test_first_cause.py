@@ -51,6 +51,17 @@ async def test_a_node_that_sends_but_does_not_answer_is_told_so(raw, make_bank, 
         await make_bank(timeout_s=0.3).open()
 
 
+async def test_a_node_whose_heartbeat_says_that_it_does_not_start_is_told_so(raw, make_bank):
+    react = raw._react
+
+    def refuse(can_id, data):
+        raw.send(0x703, b"\x7f") if (can_id, data) == (0, b"\1\3") else react(can_id, data)
+
+    raw._react = refuse
+    with pytest.raises(SilentNodeError, match=r"leg 3 .*by its heartbeat it did not start\. Read why"):
+        await make_bank(timeout_s=0.3).open()
+
+
 async def test_encoders_that_could_not_be_opened_say_why(raw, make_bank):
     del raw.nodes[3]
     bank = make_bank(timeout_s=0.3)

@@ -28,6 +28,7 @@ class EncoderSession(BankSession):
     ) -> None:
         self._legs = tuple(Leg(number, node) for number, node in enumerate(settings.nodes, 1))
         super().__init__(settings, [leg.subject for leg in self._legs])
+        self._monitors: tuple[NodeMonitor, ...] = ()
         self._data_sheet = (
             None if settings.eds is None else node_identity.read_data_sheet(Path(settings.eds))
         )
@@ -52,7 +53,6 @@ class EncoderSession(BankSession):
     def start(self) -> None:
         """Configure all nodes, and start them together."""
         self._nodes = tuple(EncoderNode(leg, self.bus, self._settings.timeout_s) for leg in self._legs)
-        self._monitors: tuple[NodeMonitor, ...] = ()
         try:
             self._start()
         except SilentNodeError as error:

@@ -31,13 +31,12 @@ def within_travel(
     Raises:
         LimitError: a point, or enough poses at it, cannot be reached without crossing a singularity.
     """
-    margin = robot.limits.singularity_margin
     sets = []
     for point in points:
         level = [robot.frames.poses(PoseBatch.at(point, np.eye(3)[None]))]
-        reference = first_reached(robot, truth, point, level, 1, margin)
+        reference = first_reached(robot, truth, point, level, 1)
         drawn = _aimed(robot, truth, reference.actual, amplitude, random)
-        others = first_reached(robot, truth, point, drawn, orientations - 1, margin)
+        others = first_reached(robot, truth, point, drawn, orientations - 1)
         sets.append(Reached.joined([reference, others]))
     return data_set(robot, sets, orientations)
 

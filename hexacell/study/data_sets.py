@@ -61,24 +61,21 @@ def unlimited_travel(
     orientations: int,
     amplitude: float,
     random: np.random.Generator,
-    *,
-    margin: float | None = None,
 ) -> DataSet:
     """Random angles within ``amplitude``, rad, at points (m, 3), mm, as in the paper's simulation.
 
     Every pose is commanded at the point itself and may end far from it, so that gauges of any travel are
-    assumed. Poses keep the singularity ``margin``, by default the robot's limit; with 0 they only have
-    to be reached without crossing a singularity.
+    assumed. Poses keep the robot's limits, its singularity margin among them; with a margin of 0 they only
+    have to be reached without crossing a singularity.
 
     Raises:
         LimitError: too few of them can be.
     """
-    margin = robot.limits.singularity_margin if margin is None else margin
     sets = []
     for point in points:
         turns = random_orientations(random, amplitude)
         drawn = (robot.frames.poses(PoseBatch.at(point, each)) for each in turns)
-        sets.append(first_reached(robot, truth, point, drawn, orientations, margin))
+        sets.append(first_reached(robot, truth, point, drawn, orientations))
     return data_set(robot, sets, orientations)
 
 
@@ -98,7 +95,7 @@ class Reached(Batch):
 
 
 def first_reached(
-    robot: Robot, truth: Geometry, point: Array, drawn: Iterable[PoseBatch], wanted: int, margin: float
+    robot: Robot, truth: Geometry, point: Array, drawn: Iterable[PoseBatch], wanted: int
 ) -> Reached:
     """The first of some commands that the robot can be brought to without crossing a singularity.
 
@@ -107,14 +104,15 @@ def first_reached(
     """
     parts: list[Reached] = []
     for commands in drawn:
-        parts.append(reached(robot, truth, commands, margin))
+        parts.append(reached(robot, truth, commands))
         if sum(len(part.commands) for part in parts) >= wanted:
             return Reached.joined(parts)[:wanted]
     raise LimitError(f"too few poses can be reached at {point} without crossing a singularity")
 
 
-def reached(robot: Robot, truth: Geometry, commands: PoseBatch, margin: float) -> Reached:
-    """The commands that keep the limits and, by both geometries, a singularity margin."""
+def reached(robot: Robot, truth: Geometry, commands: PoseBatch) -> Reached:
+    """The commands that keep the limits and, by both geometries, the singularity margin."""
+    margin = robot.limits.singularity_margin
     actual = robot.commanded(truth).actual_poses(commands)
     rows = actual.found & robot.limits.allow_commands(commands) & robot.limits.allow_joints(actual.joints)
     rows[rows] = robot.limits.allow_legs(robot.mechanism, truth, actual.poses[rows], actual.joints[rows])

@@ -238,13 +238,8 @@ def _pool(
 ) -> data_sets.Reached:
     """What can be reached of some batches of random orientations at a point."""
     turns = islice(data_sets.random_orientations(random, amplitude), batches)
-    margin = robot.limits.singularity_margin
-    return data_sets.Reached.joined(
-        [
-            data_sets.reached(robot, truth, robot.frames.poses(PoseBatch.at(point, each)), margin)
-            for each in turns
-        ]
-    )
+    drawn = (robot.frames.poses(PoseBatch.at(point, each)) for each in turns)
+    return data_sets.Reached.joined([data_sets.reached(robot, truth, each) for each in drawn])
 
 
 def _records(belief: RobotBelief, pool: data_sets.Reached) -> PredictedRecords:

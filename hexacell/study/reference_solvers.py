@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from hexacell.errors import ConvergenceError
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver import measurement_model
-from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
@@ -31,20 +30,15 @@ def error_vector(problem: Problem, residuals: Array) -> Array:
     return (residuals[rows[:, 0]] - residuals[rows[:, 1]]).ravel()
 
 
-def gauss_newton(
-    problem: Problem, *, start: Identification | None = None, steps: int = 30, tolerance_mm: float = 1e-9
-) -> Geometry:
-    """Eq. 13: ``d <- d - (A^T A)^-1 A^T E``, from the drawing, or from a result for these records.
+def gauss_newton(problem: Problem, *, steps: int = 30, tolerance_mm: float = 1e-9) -> Geometry:
+    """Eq. 13: ``d <- d - (A^T A)^-1 A^T E``, from where the problem starts.
 
     Raises:
         ConvergenceError: it left the assembly mode or did not settle; the paper's method needs a
             good initial estimate.
     """
-    if start is None:
-        problem = problem.subset(problem.has_start_pose)
-        free, poses = problem.initial_parameters, problem.start
-    else:
-        free, poses = start.free, start.poses
+    problem = problem.subset(problem.has_start_pose)
+    free, poses = problem.initial_parameters, problem.start
     rows = pairs(problem)
     for _ in range(steps):
         prediction = measurement_model.predict(problem, free, poses)

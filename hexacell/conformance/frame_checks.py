@@ -7,6 +7,7 @@ import numpy as np
 from hexacell.conformance.example import MechanismExample
 from hexacell.identification.diagnostics.frame_alignment import frame_derivatives
 from hexacell.identification.estimator import identify
+from hexacell.identification.placement import Placement
 from hexacell.identification.problem.commanded_poses import CommandingGeometry
 from hexacell.identification.problem.prior import Noise, Prior
 from hexacell.identification.problem.problem import Assumptions
@@ -15,7 +16,6 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
-from hexacell.kinematics.sensitivity import pose_sensitivity
 from hexacell.measurements.records import MeasurementSet, Record, deviation_of, joints_of
 
 ROUNDING = 1e-8
@@ -125,7 +125,7 @@ def _by_parameters(example: MechanismExample, basis: Array) -> Array:
     joints = example.joints(geometry, poses)
     weights = np.repeat([1.0, float(mechanism.platform_radius(geometry))], 3)[:, None]
     widths = example.widths.widths(mechanism.parameters)
-    columns = pose_sensitivity(mechanism, geometry, poses, joints).parameters @ (widths[:, None] * basis)
+    columns = Placement(mechanism, geometry, poses, joints).by_parameters(widths[:, None] * basis)
     columns = (weights * columns).reshape(-1, basis.shape[1])
     unseen = frame_derivatives(poses)
     if mechanism.frame_freedom.size:

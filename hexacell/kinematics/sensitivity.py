@@ -44,17 +44,6 @@ POSE = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sensitivity:
-    """Derivatives of a pose by the joint variables (n, m, 6) and the parameters (n, m, P), a unit of these.
-
-    Rows are the ball's position, mm, then, if m is 6, the rotation vector in the base frame, rad.
-    """
-
-    joints: Array
-    parameters: Array
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class FreeSensitivity(Batch):
     """Derivatives of a pose by the joint variables (n, m, 6) and the free parameters (n, m, p).
 
@@ -70,29 +59,6 @@ class FreeSensitivity(Batch):
     def mode(self) -> Array:
         """The assembly mode (n,) of each pose."""
         return assembly_mode(self.constraints)
-
-
-def pose_sensitivity(
-    mechanism: Mechanism, geometry: Geometry, poses: PoseBatch, joints: Array, coordinates: int = POSE
-) -> Sensitivity:
-    """Derivatives ``-J_pose^-1 J`` of n poses that close the mechanism, by joints and all parameters.
-
-    Raises:
-        LinAlgError: a pose is exactly at a singularity.
-    """
-    linear = mechanism.derivatives(geometry, poses, joints)
-    by_constraints = -np.linalg.inv(linear.pose)[:, :coordinates]
-    of_legs = _by_numbers_of_legs(by_constraints, linear)
-    return Sensitivity(
-        joints=by_constraints * linear.joints[..., None, :],
-        parameters=np.take(of_legs, mechanism.parameters.leg_order, axis=-1),
-    )
-
-
-def _by_numbers_of_legs(by_constraints: Array, linear: ConstraintDerivatives) -> Array:
-    """Derivatives (n, m, P) by the numbers of leg 1, 2, ..., from those by the constraints (n, m, 6)."""
-    products = by_constraints[..., None] * linear.parameters[..., None, :, :]
-    return products.reshape(*by_constraints.shape[:2], 6 * linear.parameters.shape[-1])
 
 
 def free_sensitivity(
@@ -139,7 +105,8 @@ def _by_inverse(
 ) -> FreeSensitivity:
     """The sensitivity by the inverses (n, 6, 6) of the pose Jacobians."""
     by_constraints = -inverse[:, :coordinates]
-    of_legs = _by_numbers_of_legs(by_constraints, linear)
+    products = by_constraints[..., None] * linear.parameters[..., None, :, :]
+    of_legs = products.reshape(*products.shape[:2], -1)  # by the numbers of leg 1, 2, ...
     order, convention = mechanism.parameters.leg_order, mechanism.convention
     by_free: Array = np.take(of_legs, order[convention.free_rows], axis=-1)
     for row, column in convention.dependent:

@@ -18,7 +18,7 @@ from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.forward import apply_twist, forward_kinematics
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.kinematics.sensitivity import POSITION, free_sensitivity, pose_sensitivity
+from hexacell.kinematics.sensitivity import POSITION, free_sensitivity
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.statement import covariance_factor
 
@@ -60,7 +60,7 @@ class BallByEncoders:
             solved = forward_kinematics(mechanism, geometry, shown[None], poses)
             if solved.found[0]:
                 poses, joints = solved.poses, shown[None]
-        whole = pose_sensitivity(mechanism, geometry, poses, joints).joints[0]
+        whole = free_sensitivity(mechanism, geometry, poses, joints).joints[0]
         steps = STEP_MM / np.linalg.norm(whole[:3], axis=0)
         moved = np.concatenate([np.diag(steps), -np.diag(steps)])
         near = apply_twist(poses[np.zeros(len(moved), dtype=int)], moved @ whole.T)

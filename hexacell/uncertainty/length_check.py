@@ -21,7 +21,7 @@ import numpy as np
 from hexacell.identification.problem.prior import Noise
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.kinematics.rotations import Array
-from hexacell.kinematics.sensitivity import POSITION, pose_sensitivity
+from hexacell.kinematics.sensitivity import POSITION, free_sensitivity
 from hexacell.uncertainty import length_records
 from hexacell.uncertainty.effect_kinds import COMMON_SCALE, common_encoder_scale
 from hexacell.uncertainty.effects import Effect
@@ -72,9 +72,8 @@ class LengthCheck:
         """
         placement = records.placement
         mechanism, geometry = placement.mechanism, placement.geometry
-        found = pose_sensitivity(mechanism, geometry, placement.poses, placement.joints, POSITION)
-        by_all, by_joints = found.parameters, found.joints
-        jacobian = by_all @ mechanism.convention.basis
+        found = free_sensitivity(mechanism, geometry, placement.poses, placement.joints, POSITION)
+        jacobian = found.free
         acting = [one for one in effects if one.occurrence.is_in_records and one.name != COMMON_SCALE]
         shared = {one.name: length_records.shared_errors(records, jacobian, judged, one) for one in acting}
         by_geometry = jacobian @ covariance_factor(judged.covariance)
@@ -90,7 +89,7 @@ class LengthCheck:
         )
         scaled = judged.with_scale(mechanism, geometry)
         by_scale = length_records.shared_errors(records, jacobian, scaled, common_encoder_scale(1.0))
-        noises = noise.record_covariance(by_joints)
+        noises = noise.record_covariance(found.joints)
         return cls(records, standard, jacobian, noises, errors, shared, by_scale)
 
     @property

@@ -13,7 +13,7 @@ import pytest
 from hexacell.campaign.task_accuracy import Task
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.sensitivity import pose_sensitivity
+from hexacell.kinematics.sensitivity import free_sensitivity
 from hexacell.robot.model import Robot, robot_of
 from tests.benchmarks.figures import NEVER, at_least, at_most, least_by_chance
 from tests.benchmarks.machines import on_all_cores, with_gauges_of
@@ -46,7 +46,7 @@ class InOneRound:
         assert budget is not None
         off = found.free - after.mechanism.convention.free_parameters(truth)
         actual = after.commanded(truth).actual_poses(task.poses)
-        by_joints = pose_sensitivity(after.mechanism, truth, actual.poses, actual.joints, 3).joints
+        by_joints = free_sensitivity(after.mechanism, truth, actual.poses, actual.joints, 3).joints
         size = float(np.hypot(self.scatter.seen, self.scatter.unseen))
         stops = size * self.random.standard_normal((len(by_joints), 6))
         by_geometry = budget.errors_of(off).estimated[:, :3]

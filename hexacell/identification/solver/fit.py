@@ -42,7 +42,7 @@ from hexacell.kinematics.forward import TOLERANCE_MM
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.kinematics.sensitivity import pose_sensitivity
+from hexacell.kinematics.sensitivity import POSITION, free_sensitivity
 
 INITIAL_DAMPING = 1e-4
 SMALL_DAMPING = 1e-9
@@ -174,8 +174,8 @@ def _restorable(problem: Problem, geometry: Geometry, aside: Mask) -> tuple[Mask
     """Which of the records set aside are clear of singularities at a geometry, and their poses."""
     joints = problem.joints[aside]
     solved = problem.commands[aside].solve_poses(geometry, joints)
-    sensitivity = pose_sensitivity(problem.mechanism, geometry, solved.poses, joints)
-    clear = solved.found & ~is_singular(sensitivity.joints[:, :3])
+    sensitivity = free_sensitivity(problem.mechanism, geometry, solved.poses, joints, POSITION)
+    clear = solved.found & ~is_singular(sensitivity.joints)
     restorable = np.zeros(problem.records, dtype=bool)
     restorable[aside] = clear
     return restorable, solved.poses[clear]

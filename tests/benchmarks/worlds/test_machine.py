@@ -7,11 +7,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hexacell.identification.diagnostics.frame_alignment import FrameFit, pose_errors
+from hexacell.identification.placement import Placement
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, skew
-from hexacell.kinematics.sensitivity import pose_sensitivity
+from hexacell.kinematics.sensitivity import free_sensitivity
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.virtual_robot import VirtualRobot
 from tests.benchmarks.worlds import encoders, frames, gauges, legs, rails
@@ -118,7 +119,8 @@ def test_small_shifts_move_the_platform_as_the_derivatives_of_the_product_say(ow
     ideal, joints = reached(own, Effect()), commanded_joints(own)
     change = own.truth.parameters.vector({"S": sliders, "B": platform, "l": lengths})
     off = Shift(sliders, platform, lengths)
-    linear = pose_sensitivity(own.robot.mechanism, own.truth, ideal, joints).parameters @ change
+    placed = Placement(own.robot.mechanism, own.truth, ideal, joints)
+    linear = placed.by_parameters(change[:, None])[..., 0]
     found = pose_errors(reached(own, Effect(shift=lambda *_: off)), ideal)
     assert np.abs(found - linear).max() < 2e-2 * np.abs(linear).max()
 
@@ -161,7 +163,7 @@ def test_sliders_that_do_not_repeat_scatter_the_platform_as_the_derivatives_say(
     sigma, task = 0.002, own.task.poses
     errors = world(own, rails.stopping(sigma, X)).errors(own.truth, task, own.task.workspace)
     joints = slider_places(own.truth, own.robot.branch, task)
-    by_joints = pose_sensitivity(own.robot.mechanism, own.truth, task, joints).joints[:, :3]
+    by_joints = free_sensitivity(own.robot.mechanism, own.truth, task, joints).joints[:, :3]
     expected = sigma * np.sqrt(np.sum(by_joints**2, axis=(1, 2)))
     assert np.allclose(errors.scatter, expected, rtol=0.35)
     assert errors.largest_mm < 0.5 * expected.max()

@@ -11,6 +11,7 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 from hexacell.cell.loader import load_cell
+from hexacell.identification.placement import Placement
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.legs import segment_distances
 from hexacell.kinematics.mechanism import inverse_kinematics, joint_zeros
@@ -18,8 +19,8 @@ from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.sensitivity import (
     POSITION,
+    free_sensitivity,
     has_singularity_margin,
-    pose_sensitivity,
     singularity_margin,
 )
 from hexacell.robot.model import robot_of
@@ -98,7 +99,8 @@ def pose_difference(legs, joints, steps, near):
 def test_sensitivity_agrees_with_finite_differences(hexaglide, paper, legs, pose):
     geometry, near, step = paper.actual, vector(pose), 1e-3
     joints = legs(geometry).joints(near)
-    found = pose_sensitivity(hexaglide, geometry, PoseBatch.of([pose]), joints[None])
+    at = hexaglide, geometry, PoseBatch.of([pose]), joints[None]
+    found, by_parameters = free_sensitivity(*at), Placement(*at).by_parameters(np.eye(42))
     for n in range(6):
         shift = step * np.eye(6)[n]
         ends = [(geometry, joints + shift), (geometry, joints - shift)]
@@ -108,11 +110,11 @@ def test_sensitivity_agrees_with_finite_differences(hexaglide, paper, legs, pose
         shift = step * np.eye(42)[n]
         ends = [(Geometry(HEXAGLIDE_PARAMETERS, geometry.vector + s), joints) for s in (shift, -shift)]
         moved = pose_difference(legs, joints, ends, near) / (2 * step)
-        np.testing.assert_allclose(found.parameters[0, :, n], moved, atol=1e-5)
-    short = pose_sensitivity(hexaglide, geometry, PoseBatch.of([pose]), joints[None], POSITION)
-    by_parameters, by_joints = short.parameters, short.joints
-    np.testing.assert_allclose(by_parameters, found.parameters[:, :3], atol=1e-12)
-    np.testing.assert_allclose(by_joints, found.joints[:, :3], atol=1e-12)
+        np.testing.assert_allclose(by_parameters[0, :, n], moved, atol=1e-5)
+    np.testing.assert_allclose(found.free, by_parameters @ hexaglide.convention.basis, atol=1e-12)
+    short = free_sensitivity(*at, POSITION)
+    np.testing.assert_allclose(short.free, found.free[:, :3], atol=1e-12)
+    np.testing.assert_allclose(short.joints, found.joints[:, :3], atol=1e-12)
 
 
 @given(POSES)

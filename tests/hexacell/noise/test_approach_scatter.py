@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.kinematics.sensitivity import POSITION, pose_sensitivity
+from hexacell.kinematics.sensitivity import POSITION, free_sensitivity
 from hexacell.noise.approach_scatter import ScatterSource, approach_scatter
 from hexacell.noise.ball_by_encoders import BallByEncoders
 
@@ -18,7 +18,7 @@ VISITS = 7
 def by_joints(hexaglide, paper):
     poses = PoseBatch.of([Pose(0.0, 0.0, 550.0)])
     joints = hexaglide.inverse(paper.nominal, paper.branch, poses)
-    return pose_sensitivity(hexaglide, paper.nominal, poses, joints, POSITION).joints[0]
+    return free_sensitivity(hexaglide, paper.nominal, poses, joints, POSITION).joints[0]
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ import pytest
 from hexacell.campaign.budget import COMMANDED_PROVISIONALLY, usual_move_seconds
 from hexacell.campaign.planner import Plan
 from hexacell.kinematics.pose import Pose
-from hexacell.kinematics.sensitivity import pose_sensitivity
+from hexacell.kinematics.sensitivity import free_sensitivity
 from hexacell.noise.approach_scatter import ScatterSource
 from hexacell.noise.measured_noise import AveragingForecast, with_measured_noise
 from hexacell.noise.noise_assessment import (
@@ -50,7 +50,7 @@ def jacobian(plan: Plan) -> np.ndarray:
     robot = plan.robot
     commands = robot.from_commands([REFERENCE])
     joints = robot.mechanism.inverse(robot.commanding, robot.branch, commands)
-    by_joints = pose_sensitivity(robot.mechanism, robot.commanding, commands, joints).joints[0, :3]
+    by_joints = free_sensitivity(robot.mechanism, robot.commanding, commands, joints).joints[0, :3]
     return np.asarray(robot.frames.base.T @ by_joints)
 
 

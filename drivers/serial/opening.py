@@ -7,7 +7,7 @@ import errno
 import os
 import termios
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from enum import StrEnum
@@ -57,11 +57,7 @@ def unopened_port(url: str, **settings: Any) -> serial.Serial:  # noqa: ANN401 -
 
 
 def opened_port(
-    url: str,
-    settings: Mapping[str, object],
-    subject: str,
-    closing: threading.Event,
-    inter_byte_timeout_s: float | None = None,
+    url: str, settings: Mapping[str, object], subject: str, closing: threading.Event
 ) -> serial.Serial:
     """The port, open; ``settings`` are those of pyserial, ``dtr`` and ``rts``. ``closing`` interrupts it.
 
@@ -79,7 +75,6 @@ def opened_port(
             port.write_timeout = WRITE_SLICE_S
         for name, level in lines.items():
             setattr(port, name, level)
-        port.inter_byte_timeout = inter_byte_timeout_s
         while not port.is_open:
             attempts += 1
             try:
@@ -102,16 +97,6 @@ def close_port(port: serial.Serial) -> None:
         port.close()
     if connection is not None:
         connection.close()
-
-
-def sent(write: Callable[[bytes], object], data: bytes) -> int:
-    """Write a request by a port's ``write``; how long it is. The answer shows whether it arrived.
-
-    pyserial's error also comes if all was sent and this thread was then not scheduled for so long.
-    """
-    with suppress(serial.SerialTimeoutException):
-        write(data)
-    return len(data)
 
 
 def lost_port(subject: str, url: str, reason: str, action: str = "Plug it in") -> PortLost:

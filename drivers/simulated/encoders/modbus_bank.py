@@ -35,17 +35,16 @@ class _Scale:
 class ModbusScales(Instrument):
     """The devices of six encoders: answers requests for any registers from the first to the last position.
 
-    ``counts`` gives those of legs 1 to 6, ``scales`` what is wrong with them. ``has_gaps``: registers
-    between positions are there too.
+    ``counts`` gives those of legs 1 to 6, ``scales`` what is wrong with them.
     """
 
     baudrate: ClassVar[int] = 19200
     bits_a_byte: ClassVar[int] = 11
     command_end: ClassVar[bytes] = b""
 
-    def __init__(self, described: ModbusEncoderSettings, counts: Counts, *, has_gaps: bool = True) -> None:
+    def __init__(self, described: ModbusEncoderSettings, counts: Counts) -> None:
         super().__init__({})
-        self._described, self._counts, self._has_gaps = described, counts, has_gaps
+        self._described, self._counts = described, counts
         self._latched: Sequence[int] | None = None
         self.scales = tuple(_Scale() for _ in range(6))
 
@@ -74,10 +73,8 @@ class ModbusScales(Instrument):
         described, counts = self._described, self._counts() if self._latched is None else self._latched
         words = described.bits // 16
         own = [leg for leg, place in enumerate(described.places) if place[0] == device]
-        held: dict[int, int] = {}
-        if self._has_gaps:
-            first = min(described.registers[leg] for leg in own)
-            held = dict.fromkeys(range(first, max(described.registers[leg] for leg in own)), 0)
+        registers = [described.registers[leg] for leg in own]
+        held = dict.fromkeys(range(min(registers), max(registers)), 0)
         for leg in own:
             data = (counts[leg] % (1 << described.bits)).to_bytes(2 * words)
             numbers = struct.unpack(f">{words}H", data)
@@ -100,11 +97,9 @@ class SimulatedModbusBank(Closeable):
         positions: Positions,
         clock: CellClock,
         latency_s: float = 0.0,
-        *,
-        has_gaps: bool = True,
     ) -> None:
         self._settings, self._positions = settings, positions
-        scales = ModbusScales(described, self._counts, has_gaps=has_gaps)
+        scales = ModbusScales(described, self._counts)
         self._faulty = scales.scales
         self._served = GaugeLineServer(
             scales,

@@ -30,7 +30,6 @@ REVERSED = 1 << 3
 COUNTER_OVERFLOW = 240
 
 _NOT_NOW = 0x0800_0022
-_READ_ONLY = 0x0601_0002
 _WRONG_VALUE = 0x0609_0030
 
 
@@ -195,8 +194,6 @@ class SimulatedEncoder:
             if not (old | value) & object_dictionary.TPDO_OFF and old != value:
                 raise SdoAbortedError(_WRONG_VALUE)
         if 0x1A00 <= index < 0x1C00:
-            if not self._vendor.mapping_writable:
-                raise SdoAbortedError(_READ_ONLY)
             is_on = not self._value(index - 0x200, 1) & object_dictionary.TPDO_OFF
             if is_on or (subindex and self._value(index, 0)):
                 raise SdoAbortedError(_NOT_NOW)

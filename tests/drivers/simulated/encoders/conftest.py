@@ -7,10 +7,11 @@ from typing import Any
 
 import can
 import pytest
+from canopen.objectdictionary.datatypes import UNSIGNED8
 
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.simulated.encoders.bank import SimulatedEncoderBank
-from drivers.simulated.encoders.object_dictionary import TpdoDefaults, Vendor
+from drivers.simulated.encoders.object_dictionary import TPDO_OFF, DeviceData, Row, TpdoDefaults, Vendor
 from drivers.simulated.serial_line import PtyLine, SerialLine, SocketLine
 from drivers.simulated.slcan import SlcanServer
 from hexacell.cell.devices import LinearEncoderSettings
@@ -150,23 +151,39 @@ _SPEED = (0x6030, 1, 16)
 _MAGNET_1 = (0x6020, 1, 32)
 _MAGNET_2 = (0x6020, 2, 32)
 
-EVENTS_ONLY = Vendor(
+
+class _EventsOnly(Vendor):
+    def objects(self, data: DeviceData) -> Iterator[Row]:
+        for index, subindex, name, kind, value, access in super().objects(data):
+            off = TPDO_OFF if (index, subindex) == (0x1801, 1) else 0
+            if index != 0x6005:
+                yield index, subindex, name, kind, value | off, access
+
+
+class _TwoMagnets(Vendor):
+    def objects(self, data: DeviceData) -> Iterator[Row]:
+        for index, subindex, name, kind, value, access in super().objects(data):
+            if index == 0x6004:
+                yield 0x6020, 0, "number of magnets", UNSIGNED8, 2, "ro"
+                yield from ((0x6020, magnet, f"magnet {magnet}", kind, 0, "ro") for magnet in (1, 2))
+            else:
+                yield index, subindex, name, kind, value, "ro" if 0x1A00 <= index < 0x1C00 else access
+
+
+EVENTS_ONLY = _EventsOnly(
     device_type=0x0008_0196,
     tpdos=(
         TpdoDefaults((_POSITION,), transmission_type=254, event_timer_ms=1),
-        TpdoDefaults((), transmission_type=1, enabled=False),
+        TpdoDefaults((), transmission_type=1),
     ),
-    step_in_6005=False,
 )
 """TPDO1 every millisecond, TPDO2 off and empty; the step is in 6501h."""
 
-TWO_MAGNETS = Vendor(
+TWO_MAGNETS = _TwoMagnets(
     device_type=0x000A_0196,
     tpdos=(
         TpdoDefaults((_MAGNET_1, _SPEED), transmission_type=254, event_timer_ms=10),
         TpdoDefaults((_MAGNET_2, _MAGNET_1), transmission_type=1),
     ),
-    mapping_writable=False,
-    magnets=2,
 )
 """Positions in 6020h, and a fixed mapping in which the first magnet comes second."""

@@ -21,7 +21,7 @@ import stat
 import time
 import zlib
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -116,24 +116,18 @@ class Journal(AbstractContextManager["Journal"]):
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        try:
+        with atomic_files.os_errors("the journal cannot be opened", path), ExitStack() as undone:
             self._descriptor = os.open(path, _APPENDING, 0o666 & ~atomic_files.NOT_FOR_OTHERS)
-        except OSError as error:
-            raise self._cannot_open(error) from error
-        try:
-            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            undone.callback(os.close, self._descriptor)
+            try:
+                fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                problem = "another process writes this journal"
+                raise CellBusy(problem, subject=path, action="End it") from None
             entries, self._whole = self._read()
             self._events, self.lasted_s = [entry.event for entry in entries], _lasted_s(entries)
             self._digest, self._times = self._digest_of_file(), self._times_of_file()
-        except BlockingIOError:
-            os.close(self._descriptor)
-            raise CellBusy("another process writes this journal", subject=path, action="End it") from None
-        except OSError as error:
-            os.close(self._descriptor)
-            raise self._cannot_open(error) from error
-        except BaseException:
-            os.close(self._descriptor)
-            raise
+            undone.pop_all()
         self._is_torn = False
 
     @property
@@ -150,19 +144,18 @@ class Journal(AbstractContextManager["Journal"]):
         """
         self.require_intact()
         line = self._line(event)
-        try:
-            if self._is_torn:
-                self._cut_off()
-            self._is_torn = True
-            _write_whole(self._descriptor, line)
-            os.fsync(self._descriptor)
-            self._is_torn = False
-        except OSError as error:
-            with suppress(OSError):
-                self._cut_off()
-            raise atomic_files.os_error_to_file_error(
-                "the journal cannot be written", self.path, error
-            ) from error
+        with atomic_files.os_errors("the journal cannot be written", self.path):
+            try:
+                if self._is_torn:
+                    self._cut_off()
+                self._is_torn = True
+                _write_whole(self._descriptor, line)
+                os.fsync(self._descriptor)
+                self._is_torn = False
+            except OSError:
+                with suppress(OSError):
+                    self._cut_off()
+                raise
         self._events.append(event)
         self._whole += len(line)
         self._digest.update(line)
@@ -249,9 +242,6 @@ class Journal(AbstractContextManager["Journal"]):
         """Remove what a failure left of a line, perhaps now that it can be done."""
         os.ftruncate(self._descriptor, self._whole)
         self._is_torn = False
-
-    def _cannot_open(self, error: OSError) -> FileError:
-        return atomic_files.os_error_to_file_error("the journal cannot be opened", self.path, error)
 
 
 def _lasted_s(entries: Sequence[Entry]) -> float:

@@ -94,6 +94,5 @@ def temperatures_shown(readings: Iterable[Reading]) -> dict[str, list[float]]:
 
 def mean_temperature(readings: Iterable[Reading]) -> float | None:
     """The mean, deg C, of all that thermometers showed at some records; None if there was nothing."""
-    every = [one.celsius for reading in readings for one in reading.temperatures]
-    shown = [celsius for celsius in every if celsius is not None]
+    shown = [celsius for every in temperatures_shown(readings).values() for celsius in every]
     return float(np.mean(shown)) if shown else None

@@ -25,6 +25,9 @@ SETTLING_MISFIT = 4.0
 LARGEST_TRUSTED_RATIO = 10.0
 """Residuals over the stated noise up to which first-order tests around the solution are valid."""
 
+LARGEST_MEAN_SQUARE = 3.0
+"""Largest mean square difference from the drawing, in sigma, of a solution that may be the robot."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CorrectedFit:
@@ -93,6 +96,13 @@ class CorrectedFit:
         return self.is_reliable and self.fit.goodness.agreement is not ChiSquareVerdict.TOO_LARGE
 
     @property
+    def is_plausible(self) -> bool:
+        """Whether it is of all records, and within the tolerances, however large the residuals are."""
+        prior = self.problem.prior
+        is_near = prior.squared_distance(self.fit.free) <= LARGEST_MEAN_SQUARE * len(prior.free)
+        return not self.lost and self.fit.converged and is_near
+
+    @property
     def misfit(self) -> float:
         """The mean square residual; a lost record counts as one at the largest trusted ratio."""
         squares = self.fit.goodness.ratio**2 * self.fit.records + LARGEST_TRUSTED_RATIO**2 * self.lost
@@ -106,6 +116,10 @@ class CorrectedFit:
     def is_better_by_far_than(self, other: CorrectedFit) -> bool:
         """Whether it explains so much more that it is right although something else is still wrong."""
         return self.misfit_beside(other) < other.misfit / SUFFICIENT_DECREASE
+
+    def replaces(self, other: CorrectedFit) -> bool:
+        """Whether it is plausible, and the other one, with as many unknowns, is not or leaves far more."""
+        return self.is_plausible and not (other.is_plausible and not self.is_better_by_far_than(other))
 
     def settles(self, other: CorrectedFit) -> bool:
         """Whether no other hypothesis can explain it better: it agrees, or an imperfect machine is left."""

@@ -16,7 +16,8 @@ instead of log n. Starting with no fault at all (:func:`select_faults`):
    critical values, and that of a reading off by 0.5 mm in a good one at least 4.8.
 
 Gross errors, and all records after a shift of a gauge's zero, are left out. Gauge faults are refused if
-all that was found explains the records, and no fit explains them as they are (:func:`_other_minimum`).
+all that was found explains the records, or as much as a geometry within the tolerances can in a machine
+that no model explains, and no fit explains them as they are (:func:`_other_minimum`).
 
 First-order tests around a wrong solution are unreliable. The drawing is a better expansion point: it is
 within millimetres of the truth, whatever the gauges read. What is tried by refits, in this order
@@ -72,9 +73,6 @@ FEW_RECORDS = 60
 
 OTHER_STARTS = 4
 """With few records, the start points that are tried before a gauge fault is reported."""
-
-LARGEST_MEAN_SQUARE = 3.0
-"""Largest mean square difference from the drawing, in sigma, of a solution from another start."""
 
 GOOD_AGREEMENT = 0.05
 """Probability of the residuals of the rest from which they agree well."""
@@ -132,8 +130,8 @@ def select_faults(problem: Problem, fit: Identification | None = None) -> Select
                 raise refused
         readmitted = _readmitted(selected)
         return _only_proven(selected if readmitted is None else _forward(readmitted))
-    except UncorrectableFaultError:
-        if (other := _other_minimum(problem)) is None:
+    except UncorrectableFaultError as refused:
+        if (other := _other_minimum(problem, refused)) is None:
             raise
         return Selection(other, {})
 
@@ -141,7 +139,8 @@ def select_faults(problem: Problem, fit: Identification | None = None) -> Select
 def _forward(current: CorrectedFit) -> CorrectedFit:
     """Correct for the most likely hypothesis until nothing is significant, or too many were rejected.
 
-    One that leaving records out cannot correct is no cause unless all that was found explains the records.
+    One that leaving records out cannot correct is no cause unless all that was found explains the records,
+    or replaces the longer fit of them as they are.
     """
     start, refused = current, None
     while len(current.rejected) < LARGEST_REJECTED_SHARE * current.original.records:
@@ -159,7 +158,12 @@ def _forward(current: CorrectedFit) -> CorrectedFit:
         refused = _refused(start, current)
         if refused is not None and current.is_reliable:
             raise refused
-    return current if refused is None else start.fitted(start.original, start.problem, start.faults, COARSE)
+    if refused is None:
+        return current
+    as_they_are = start.fitted(start.original, start.problem, start.faults, COARSE)
+    if current.replaces(as_they_are):
+        raise refused
+    return as_they_are
 
 
 def confirmed_by_refit(current: CorrectedFit, hypothesis: FaultHypothesis) -> CorrectedFit | None:
@@ -323,12 +327,17 @@ def required_significance(rest: ChiSquareTest, faults: int) -> float:
     return BESIDE_AGREEING if rest.is_explained else BESIDE_DISAGREEING
 
 
-def _other_minimum(problem: Problem) -> CorrectedFit | None:
-    """A fit within the tolerances of all readings as they are, by a longer search or from other starts."""
-    largest = LARGEST_MEAN_SQUARE * len(problem.prior.free)
+def _other_minimum(problem: Problem, refused: UncorrectableFaultError) -> CorrectedFit | None:
+    """A fit within the tolerances of all readings as they are, by a longer search or from other starts.
+
+    It agrees with the noise, or beside it what remains with a gauge fault ``refused`` is no proof.
+    """
+    after = refused.after
+    is_proof = after.is_consistent or not isinstance(refused.fault, GaugeFaultHypothesis)
     others = islice(restarts(problem), OTHER_STARTS if problem.records <= FEW_RECORDS else 0)
     for start in chain([(problem, COARSE)], zip(others, repeat(QUICK))):
         found = CorrectedFit.uncorrected(*start)
-        if found.is_consistent and problem.prior.squared_distance(found.fit.free) <= largest:
+        explains = found.is_consistent or not (is_proof or after.is_better_by_far_than(found))
+        if found.is_plausible and explains:
             return found
     return None

@@ -121,10 +121,6 @@ class Guards:
         pollers = self._pollers(encoders=not self.settings.encoders.are_of_controller)
         await self.supervisor.supervise(order, pollers, self._limits(), STOP_GRACE_S)
 
-    async def require_reloaded(self) -> None:
-        """Make sure that the controller runs the geometry of its config."""
-        await self.locate()
-
     async def _arrival_trip(self, commanded: Array, reached: EncoderSample) -> Trip | None:
         """A joint is not where it was commanded (6,), or the controller is wrong about where it is."""
         words = self.settings.mechanism.words
@@ -135,7 +131,7 @@ class Guards:
     def _limits(self, rest: float | None = None, zero_mm: ThreeNumbers | None = None) -> GuardLimits:
         guards = self.settings.guards
         plate = gauge_travel_of(self.settings).room(zero_mm).widened(guards.plate_margin_mm)
-        return GuardLimits(guards.stale_s, plate, rest, self.settings.mechanism.words)
+        return GuardLimits(guards.stale_s, plate, self.settings.mechanism.words, rest)
 
     def _pollers(
         self, *, controller: bool = False, encoders: bool = True, gauges: "tuple[WatchedGauge, ...]" = ()

@@ -55,7 +55,7 @@ class _Absent:
         return _nothing
 
 
-async def _nothing(*_args: object, **_named: object) -> None:
+async def _nothing(*_args: object, **_named: object) -> Any:  # noqa: ANN401 - of whatever is asked
     """Nothing to do."""
 
 
@@ -80,7 +80,7 @@ class RecordedOperator:
 class InactiveGuards(Guards):
     """Guards without supervision."""
 
-    prepare = move = while_not_ready = require_reloaded = _nothing
+    prepare = move = while_not_ready = locate = _nothing
 
     async def at_standstill(self, action: Supervised[Result]) -> Result:
         """Run it."""
@@ -107,11 +107,7 @@ class RecordedStepExecutor(StepExecutor):
         folder, config = self.folder.path, self.current_config
         return InactiveGuards(self.cell.settings, self.devices, self.clock, folder, config)
 
-    async def require_unedited_config(self, state: RunState) -> None:
-        """The config is that of the replay."""
-
-    async def require_departure(self, state: RunState) -> None:
-        """No robot moves."""
+    require_unedited_config = require_departure = _nothing  # no robot moves
 
     async def locate(self) -> PositionReports:
         """The recorded position, which was checked then."""

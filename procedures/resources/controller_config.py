@@ -81,7 +81,7 @@ class Startup:
             await self.guards.while_not_ready(lambda: self.controller.reload(self.stated))
         except StartupNotPermitted:
             await self._prepare_asking(frozenset({StartupAction.RESET_ESTOP}))
-        await self.guards.require_reloaded()
+        await self.guards.locate()
 
     async def _prepare_asking(self, theirs: StartupActions) -> None:
         """Make it ready; ``theirs`` is what a person does, and this program never."""

@@ -4,16 +4,14 @@ import numpy as np
 
 from hexacell.kinematics.mechanism import MechanismWords
 from hexacell.kinematics.rotations import Array
-from procedures.guards.rules.base import MAX_GARBLED, SOME_MECHANISM, joint_trip
+from procedures.guards.rules.base import MAX_GARBLED, joint_trip
 from procedures.run.trips import Guard, Trip
 
 STUCK_GAUGE_MM = 1.0
 """A gauge is stuck if its display did not change over an expected displacement larger than this."""
 
 
-def following_error(
-    commanded: Array, measured: Array, limit: float, of: MechanismWords = SOME_MECHANISM
-) -> Trip | None:
+def following_error(commanded: Array, measured: Array, limit: float, of: MechanismWords) -> Trip | None:
     """After a move: a joint (6,) is too far from its commanded position; ``of`` has its word and unit."""
     unit = of.joint_unit
     words = f"is {{:+.3f}} {unit} from its commanded position (limit {limit:g} {unit})"

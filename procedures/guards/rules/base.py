@@ -14,8 +14,6 @@ from procedures.run.trips import Guard, Trip
 MAX_GARBLED = 3
 """So many garbled answers in a row are a device fault; fewer are noise on the line."""
 
-SOME_MECHANISM = MechanismWords("robot", joint="joint")
-
 
 @dataclass(frozen=True, slots=True)
 class GuardLimits:
@@ -24,14 +22,14 @@ class GuardLimits:
     Attributes:
         stale_s: longest silence of a device, s of real time.
         plate: how far the ball may go from the set's reference.
-        rest: largest displacement of a joint at standstill, in its unit; None while the robot moves.
         words: the mechanism's, for a joint and its unit.
+        rest: largest displacement of a joint at standstill, in its unit; None while the robot moves.
     """
 
     stale_s: float
     plate: GaugeRoom
+    words: MechanismWords
     rest: float | None = None
-    words: MechanismWords = SOME_MECHANISM
 
 
 Rule = Callable[[PolledDevices, GuardLimits], Trip | None]

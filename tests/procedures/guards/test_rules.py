@@ -27,7 +27,7 @@ from procedures.steps import events
 from procedures.steps.close import reference_drift
 
 PLATE = GaugeRoom.symmetric(5.5)
-LIMITS = GuardLimits(stale_s=0.12, plate=PLATE)
+LIMITS = GuardLimits(0.12, PLATE, Hexaglide.words)
 AT_END = GaugeAtEnd("plunger at its end", subject="gauge x", action="Move the gauge or the ball")
 
 
@@ -116,7 +116,7 @@ def test_a_snapshot_without_a_fault_trips_no_guard(harmless: PolledDevices) -> N
 
 
 def test_the_ball_may_go_as_far_as_each_side_has_room() -> None:
-    limits = GuardLimits(0.12, GaugeRoom((-5.0, -5.0, -5.0), (1.2, 5.0, 5.0)))
+    limits = GuardLimits(0.12, GaugeRoom((-5.0, -5.0, -5.0), (1.2, 5.0, 5.0)), Hexaglide.words)
     assert first_trip(PolledDevices((gauge(-4.9, 0.0, 0),)), limits) is None
     assert first_trip(PolledDevices((gauge(4.9, 0.0, 1),)), limits) is None
     trip = first_trip(PolledDevices((gauge(1.3, 0.0, 0),)), limits)
@@ -141,7 +141,7 @@ def test_a_slider_that_moves_at_standstill_trips_the_following_guard(leg: int, w
     now[leg] += way
     snapshot = PolledDevices(encoders=sliders(tuple(now), (10.0,) * 6))
     assert first_trip(snapshot, LIMITS) is None, "a robot that moves may"
-    trip = first_trip(snapshot, GuardLimits(0.12, PLATE, 1.0, Hexaglide.words))
+    trip = first_trip(snapshot, GuardLimits(0.12, PLATE, Hexaglide.words, 1.0))
     if abs(now[leg] - 10.0) > 1.0:
         assert trip is not None
         assert (trip.guard, trip.device) == (Guard.FOLLOWING, f"slider {leg + 1}")
@@ -195,7 +195,7 @@ def test_the_trip_of_a_cause_precedes_those_of_its_effects() -> None:
 
 def test_a_slider_beyond_the_following_limit_is_named() -> None:
     sent = np.arange(6.0)
-    assert following_error(sent, sent + 1.0, 1.0) is None
+    assert following_error(sent, sent + 1.0, 1.0, Hexaglide.words) is None
     measured = sent + np.array([0.0, 0.5, 0.0, 0.0, -1.25, 1.0])
     trip = following_error(sent, measured, 1.0, Hexaglide.words)
     assert trip is not None

@@ -9,6 +9,7 @@ import pytest
 from drivers.errors import WrongAnswer
 from drivers.interfaces import GaugeReading
 from hexacell.errors import DeviceError
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.limits.gauge_travel import GaugeRoom
 from procedures.guards.polling import DevicePoller, LineActivity, PolledDevices
 from procedures.guards.rules.base import GuardLimits
@@ -22,7 +23,7 @@ from procedures.steps.move import Expectation, Move
 from procedures.steps.sample import Sample
 from tests.waiting import cancel
 
-LIMITS = GuardLimits(0.12, GaugeRoom.symmetric(5.5))
+LIMITS = GuardLimits(0.12, GaugeRoom.symmetric(5.5), Hexaglide.words)
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 P2 = SetKey(phase=Phase.IDENTIFY, point=2)
 

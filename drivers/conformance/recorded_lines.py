@@ -5,11 +5,11 @@ import select
 import threading
 import time
 import uuid
-from abc import ABC, abstractmethod
 from collections import defaultdict, deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import can
 
@@ -20,9 +20,6 @@ SLICE_S = 0.02
 FRAME = re.compile(r"(?P<id>[0-9A-F]{3})#(?P<data>(?:[0-9A-F]{2})*)")
 UNASKED_DELAY_S = 0.05
 """What came before the first request comes so long after the line was opened."""
-
-Address = TypeVar("Address")
-"""Where a driver finds the line."""
 
 Answers = tuple[tuple[float, bytes], ...]
 """Bytes that came, each with how long after the request before them, s."""
@@ -70,67 +67,49 @@ def traffic(entries: Iterable[TraceEntry], line: str) -> tuple[Answers, list[Rec
     return answers(0, ends[0], said[0].time_s - UNASKED_DELAY_S), exchanges
 
 
-class _Served(ABC, Generic[Address]):
-    """A thread that answers as long as the context lasts, or until the driver asks something else.
+@contextmanager
+def _served(
+    requests: Callable[[float], Iterator[Answers]],
+    send: Callable[[bytes], None],
+    break_off: Callable[[], None] = lambda: None,
+) -> Iterator[None]:
+    """Answer from a thread as long as the context lasts, or until the driver asks something else.
 
-    At the end that is raised: it is the cause of whatever was raised before.
+    At the end that is raised: it is the cause of whatever was raised before. ``requests`` waits for some,
+    no longer than it is told, and gives the answers to each; ``break_off`` breaks the line, where that is
+    possible, so that the driver need not wait for its time-out.
     """
+    stopping, failures = threading.Event(), list[Exception]()
 
-    _address: Address
-
-    def __init__(self, unasked: Answers) -> None:
-        self._failure: Exception | None = None
-        self._stopping = threading.Event()
-        self._due: deque[tuple[float, bytes]] = deque()
-        self._unasked = unasked
-        self._thread = threading.Thread(target=self._run, name="recorded line", daemon=True)
-
-    def __enter__(self) -> Address:
-        self._thread.start()
-        return self._address
-
-    def __exit__(self, *_: object) -> None:
-        self._stopping.set()
-        self._thread.join()
-        self._close()
-        if self._failure is not None:
-            raise self._failure
-
-    @abstractmethod
-    def _serve_once(self) -> None:
-        """Wait for a request for no longer than ``_wait_s``, and schedule its answers."""
-
-    @abstractmethod
-    def _send(self, data: bytes) -> None: ...
-
-    @abstractmethod
-    def _close(self) -> None: ...
-
-    def _break(self) -> None:
-        """Break the line, where that is possible, so that the driver need not wait for its time-out."""
-
-    def _run(self) -> None:
+    def run() -> None:
+        due = deque[tuple[float, bytes]]()
         try:
-            while not self._stopping.is_set():
-                self._serve_once()
-                while self._due and self._due[0][0] <= time.monotonic():
-                    self._send(self._due.popleft()[1])
+            while not stopping.is_set():
+                left_s = due[0][0] - time.monotonic() if due else SLICE_S
+                for answers in requests(min(SLICE_S, max(0.0, left_s))):
+                    now_s = time.monotonic()
+                    # Those to the request before come first, whatever is left of their delay.
+                    due = deque((now_s, data) for _, data in due)
+                    due += [(now_s + delay_s, data) for delay_s, data in answers]
+                while due and due[0][0] <= time.monotonic():
+                    send(due.popleft()[1])
         except Exception as error:  # it must reach the test
-            self._failure = error
-            self._break()
+            failures.append(error)
+            break_off()
 
-    def _schedule(self, answers: Answers) -> None:
-        """Answers to come; those to the request before come first, whatever is left of their delay."""
-        now_s = time.monotonic()
-        self._due = deque((now_s, data) for _, data in self._due)
-        self._due += [(now_s + delay_s, data) for delay_s, data in answers]
+    thread = threading.Thread(target=run, name="recorded line", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        stopping.set()
+        thread.join()
+        if failures:
+            raise failures[0]
 
-    def _wait_s(self) -> float:
-        left_s = self._due[0][0] - time.monotonic() if self._due else SLICE_S
-        return min(SLICE_S, max(0.0, left_s))
 
-
-class recorded_line(_Served[str]):  # noqa: N801 - named as what a test writes behind ``with``
+@contextmanager
+def recorded_line(entries: Iterable[TraceEntry], line: str) -> Iterator[str]:
     """Serve a serial line of a trace on a pseudo-terminal, and give its URL.
 
     Requests must come in the order of the trace; what came after each comes again, as late as it did, or
@@ -141,45 +120,35 @@ class recorded_line(_Served[str]):  # noqa: N801 - named as what a test writes b
         DialogueDiffers: at the end, whatever else was raised, if the driver asked something else. The line
             is broken from there on.
     """
+    unasked, exchanges = traffic(entries, line)
+    left, received = deque(exchanges), b""
 
-    def __init__(self, entries: Iterable[TraceEntry], line: str) -> None:
-        unasked, exchanges = traffic(entries, line)
-        super().__init__(unasked)
-        self._left = deque(exchanges)
-        self._line = PtyLine("recorded")
-        self._address = self._line.url
-        self._received = b""
-
-    def _serve_once(self) -> None:
-        ready, _, _ = select.select(self._line.descriptors(), [], [], self._wait_s())
+    def requests(wait_s: float) -> Iterator[Answers]:
+        nonlocal unasked, received
+        ready, _, _ = select.select(served.descriptors(), [], [], wait_s)
         if not ready:
             return
-        self._schedule(self._unasked)  # the line is open now
-        self._unasked = ()
-        self._received += self._line.receive(ready)
-        while self._received:
-            expected = self._left[0].request if self._left else b""
-            request = self._received[: len(expected)] or self._received
-            if expected.startswith(self._received) and request != expected:
+        yield unasked  # the line is open now
+        unasked = ()
+        received += served.receive(ready)
+        while received:
+            expected = left[0].request if left else b""
+            request = received[: len(expected)] or received
+            if expected.startswith(received) and request != expected:
                 return  # the rest of it comes yet
-            if not self._left:
+            if not left:
                 raise DialogueDiffers(f"asks {request!r} after the last request of the trace")
             if request != expected:
-                raise DialogueDiffers(f"asks {request!r}, where {self._left[0]}, is {expected!r}")
-            self._received = self._received[len(request) :]
-            self._schedule(self._left.popleft().answers)
+                raise DialogueDiffers(f"asks {request!r}, where {left[0]}, is {expected!r}")
+            received = received[len(request) :]
+            yield left.popleft().answers
 
-    def _send(self, data: bytes) -> None:
-        self._line.send(data)
-
-    def _break(self) -> None:
-        self._line.unplug()
-
-    def _close(self) -> None:
-        self._line.close()
+    with closing(PtyLine("recorded")) as served, _served(requests, served.send, served.unplug):
+        yield served.url
 
 
-class recorded_bus(_Served[Mapping[str, Any]]):  # noqa: N801
+@contextmanager
+def recorded_bus(entries: Iterable[TraceEntry], line: str) -> Iterator[Mapping[str, Any]]:
     """Serve the encoders' bus of a trace on a virtual bus, and give the settings for ``can.Bus``.
 
     Each frame is answered as the same one was, the first time, the second time and so on: the time of day
@@ -189,32 +158,29 @@ class recorded_bus(_Served[Mapping[str, Any]]):  # noqa: N801
         ValueError: the trace has no such line.
         DialogueDiffers: at the end, if the driver asked something else.
     """
+    unasked, exchanges = traffic(entries, line)
+    left: defaultdict[bytes, deque[Answers]] = defaultdict(deque)
+    for exchange in exchanges:
+        left[exchange.request].append(exchange.answers)
 
-    def __init__(self, entries: Iterable[TraceEntry], line: str) -> None:
-        unasked, exchanges = traffic(entries, line)
-        super().__init__(unasked)
-        self._left: defaultdict[bytes, deque[RecordedExchange]] = defaultdict(deque)
-        for exchange in exchanges:
-            self._left[exchange.request].append(exchange)
-        self._address = {"interface": "virtual", "channel": f"recorded-{uuid.uuid4().hex}"}
-        self._bus = can.Bus(**self._address)
-
-    def _serve_once(self) -> None:
-        if (message := self._bus.recv(self._wait_s())) is None:
+    def requests(wait_s: float) -> Iterator[Answers]:
+        nonlocal unasked
+        if (message := bus.recv(wait_s)) is None:
             return
-        self._schedule(self._unasked)  # the line is open now
-        self._unasked = ()
+        yield unasked  # the line is open now
+        unasked = ()
         request = f"{message.arbitration_id:03X}#{bytes(message.data).hex().upper()}".encode()
-        if request not in self._left:
+        if request not in left:
             raise DialogueDiffers(f"asks {request!r}, which the trace has nowhere")
-        left = self._left[request]
-        self._schedule((left.popleft() if len(left) > 1 else left[0]).answers)
+        same = left[request]
+        yield same.popleft() if len(same) > 1 else same[0]
 
-    def _send(self, data: bytes) -> None:
+    def send(data: bytes) -> None:
         if (match := FRAME.fullmatch(data.decode())) is None:
             raise ValueError(f"{data!r} is no frame of a trace")
         number, content = int(match["id"], 16), bytes.fromhex(match["data"])
-        self._bus.send(can.Message(arbitration_id=number, data=content, is_extended_id=False))
+        bus.send(can.Message(arbitration_id=number, data=content, is_extended_id=False))
 
-    def _close(self) -> None:
-        self._bus.shutdown()
+    address = {"interface": "virtual", "channel": f"recorded-{uuid.uuid4().hex}"}
+    with can.Bus(**address) as bus, _served(requests, send):
+        yield address

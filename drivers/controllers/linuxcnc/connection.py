@@ -7,7 +7,7 @@ import os
 import re
 from collections import deque
 from collections.abc import AsyncIterator, Callable
-from contextlib import AbstractAsyncContextManager, asynccontextmanager, nullcontext, suppress
+from contextlib import AbstractAsyncContextManager, ExitStack, asynccontextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from typing import Self
 
@@ -54,20 +54,10 @@ class SendArbiter:
     async def query_turn(self) -> AsyncIterator[None]:
         """Send inside; the line is released after ``PARSED_S`` even if the answer is still awaited."""
         await self.line.acquire()
-        is_held = True
-
-        def release() -> None:
-            nonlocal is_held
-            if is_held:
-                is_held = False
-                self.line.release()
-
-        timer = asyncio.get_running_loop().call_later(PARSED_S, release)
-        try:
+        with ExitStack() as turn:
+            turn.callback(self.line.release)
+            turn.callback(asyncio.get_running_loop().call_later(PARSED_S, turn.close).cancel)
             yield
-        finally:
-            timer.cancel()
-            release()
 
     @asynccontextmanager
     async def command_turn(self) -> AsyncIterator[None]:

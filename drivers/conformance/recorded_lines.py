@@ -181,6 +181,6 @@ def recorded_bus(entries: Iterable[TraceEntry], line: str) -> Iterator[Mapping[s
         number, content = int(match["id"], 16), bytes.fromhex(match["data"])
         bus.send(can.Message(arbitration_id=number, data=content, is_extended_id=False))
 
-    address = {"interface": "virtual", "channel": f"recorded-{uuid.uuid4().hex}"}
+    address: dict[str, Any] = {"interface": "virtual", "channel": f"recorded-{uuid.uuid4().hex}"}
     with can.Bus(**address) as bus, _served(requests, send):
         yield address

@@ -7,7 +7,7 @@ import errno
 import os
 import termios
 import threading
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -56,7 +56,11 @@ def unopened_port(url: str, **settings: Any) -> serial.Serial:  # noqa: ANN401 -
 
 
 def opened_port(
-    url: str, settings: Mapping[str, object], subject: str, closing: threading.Event
+    url: str,
+    settings: Mapping[str, object],
+    subject: str,
+    closing: threading.Event,
+    inter_byte_timeout_s: float | None = None,
 ) -> serial.Serial:
     """The port, open; ``settings`` are those of pyserial, ``dtr`` and ``rts``. ``closing`` interrupts it.
 
@@ -74,6 +78,7 @@ def opened_port(
             port.write_timeout = WRITE_SLICE_S
         for name, level in lines.items():
             setattr(port, name, level)
+        port.inter_byte_timeout = inter_byte_timeout_s
         while not port.is_open:
             attempts += 1
             try:
@@ -96,6 +101,16 @@ def close_port(port: serial.Serial) -> None:
         port.close()
     if connection is not None:
         connection.close()
+
+
+def sent(write: Callable[[bytes], object], data: bytes) -> int:
+    """Write a request by a port's ``write``; how long it is. The answer shows whether it arrived.
+
+    pyserial's error also comes if all was sent and this thread was then not scheduled for so long.
+    """
+    with suppress(serial.SerialTimeoutException):
+        write(data)
+    return len(data)
 
 
 def lost_port(subject: str, url: str, reason: str, action: str = "Plug it in") -> PortLost:

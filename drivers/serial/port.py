@@ -7,7 +7,7 @@ opening of a network port, which pyserial limits to five seconds.
 import termios
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from math import inf
 
 import serial
@@ -172,9 +172,7 @@ class SerialPort(request_port.RequestPort):
         request = request if self._parity is None else self._parity.encode(request)
         self._record(TrafficDirection.SENT, request)
         self._last_traffic = self._asked_at
-        # Also raised if all was sent and this thread was then not scheduled: the answer shows it.
-        with suppress(serial.SerialTimeoutException):
-            port.write(request)
+        opening.sent(port.write, request)
 
     @contextmanager
     def _port_errors(self) -> Iterator[None]:

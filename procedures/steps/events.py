@@ -261,8 +261,20 @@ class Ended(BaseEvent):
     kept_as: ClassVar[str] = "ended"
 
 
-_OWN = [one for one in tuple(vars().values()) if isinstance(one, type) and one.__module__ == __name__]
-EVENTS = tuple(dict.fromkeys([*_OWN, *(event for step in STEPS for event in step.outcomes)]))
+_COURSE: tuple[type[BaseEvent], ...] = (
+    RunStarted,
+    StepBegun,
+    RecordDiscarded,
+    Paused,
+    Resumed,
+    RunRecalled,
+    Failed,
+    CommandRejected,
+    Tripped,
+    Interrupted,
+    Ended,
+)
+EVENTS = tuple(dict.fromkeys([*_COURSE, *(event for step in STEPS for event in step.outcomes)]))
 
 if TYPE_CHECKING:
     Event = BaseEvent

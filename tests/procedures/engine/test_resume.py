@@ -57,7 +57,7 @@ async def test_a_run_resumes_after_an_interruption_at_any_stage(recording, repla
     kept = {key: measured for key, measured in before.sets.items() if measured.closed}
     assert {key: after.sets[key] for key in kept} == kept
     require_whole_sets(history)
-    readings = [one.reading for one in history if getattr(one, "reading", None) is not None]
+    readings = [found for one in history if (found := getattr(one, "reading", None)) is not None]
     assert [one.at_s for one in readings] == sorted(one.at_s for one in readings), "their time goes on"
 
 

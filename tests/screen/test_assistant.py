@@ -75,15 +75,6 @@ async def test_the_questions_lead_to_a_valid_cell_file(path: Path) -> None:
     ]
 
 
-async def test_leaving_it_writes_nothing(path: Path) -> None:
-    async with opened_assistant(path) as pilot:
-        await press(pilot, "enter")
-        await pilot.press("ctrl+q")
-        await until(lambda: pilot.app.return_code is not None)
-    with pytest.raises(FileError, match="does not exist"):
-        load_cell(path)
-
-
 def test_a_wrong_answer_is_refused_with_its_reason(path: Path) -> None:
     draft = CellDraft(path)
     for name, given, problem in (

@@ -61,20 +61,6 @@ async def opened_history(cell: Cell) -> AsyncIterator[Pilot[int]]:
         yield pilot
 
 
-async def test_the_config_of_before_the_latest_run_is_put_back(cell: Cell, runs: list[ProposedRun]) -> None:
-    async with opened_history(cell) as pilot:
-        await pilot.press("b")
-        await until(lambda: isinstance(pilot.app.screen, ConfirmOverlay))
-        assert "Undo 2026-11-21T100000Z" in shown(pilot)
-        await press(pilot, "n")
-        assert cell.config_path.read_bytes() == runs[1].after
-        await press(pilot, "b", "y")
-        await until_shown(pilot, "again, bit for bit, which undoes the run 2026-11-21T100000Z")
-        await until(lambda: [one.message for one in pilot.app._notifications] == [RELOAD])
-    assert cell.config_path.read_bytes() == runs[1].before
-    assert config_history(cell).writes[0].record.by == PERSON
-
-
 async def test_what_is_not_done_says_why_and_changes_nothing(cell: Cell, runs: list[ProposedRun]) -> None:
     earlier, latest = (run.folder.path.name for run in runs)
     async with attended(WithoutDevices(cell.path)) as model:
@@ -99,7 +85,7 @@ async def test_a_history_that_cannot_be_read_says_why(cell: Cell, runs: list[Pro
         assert "cannot be read" in model.shown("history")["comparison"][0][-1]
 
 
-async def test_a_recorded_run_is_watched_again_with_its_cursor(cell: Cell, runs: list[ProposedRun]) -> None:
+async def test_a_recorded_run_is_watched_again_with_its_cursor_and_undone(cell, runs) -> None:
     async with opened_history(cell) as pilot:
         await press(pilot, "enter")
         await until_shown(pilot, "recorded calibration 2026-11-21T100000Z")
@@ -110,6 +96,16 @@ async def test_a_recorded_run_is_watched_again_with_its_cursor(cell: Cell, runs:
         await until_shown(pilot, " 2/")
         await press(pilot, "left", "end")
         await until(lambda: shown(pilot) == last)
+        await press(pilot, "5", "b")
+        await until_asked(pilot)
+        assert "Undo 2026-11-21T100000Z" in shown(pilot)
+        await press(pilot, "n")
+        assert cell.config_path.read_bytes() == runs[1].after
+        await press(pilot, "b", "y")
+        await until_shown(pilot, "again, bit for bit, which undoes the run 2026-11-21T100000Z")
+        await until(lambda: [one.message for one in pilot.app._notifications] == [RELOAD])
+    assert cell.config_path.read_bytes() == runs[1].before
+    assert config_history(cell).writes[0].record.by == PERSON
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from textual.events import Paste
 from textual.pilot import Pilot
 from textual.widgets import Input
 
-from hexacell.screen.overlays import ConfirmOverlay, QuestionOverlay
+from hexacell.screen.overlays import QuestionOverlay
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.run.questions import PendingChange, ask_approval
 from tests.screen.conftest import settled
@@ -50,14 +50,27 @@ async def test_every_key_on_every_screen_twice(tab, is_running, cell, history, o
 
 
 async def test_what_is_pasted_into_a_name_is_no_consent(cell, history, opened) -> None:
-    grave = AcceptanceGate(
-        name="within tolerance", passed=False, sentence="Far.", needs_person=True, needs_cell_name=True
-    )
+    """Nor has a long change what to press out of sight, whether or not the name is asked for."""
     run = ToldRun()
     async with opened(workplace_of(cell, run, history[:300])) as pilot:
-        run.ask(ask_approval(PendingChange((grave,), "-old\n+new"), cell=cell.settings.name))
-        await until(lambda: isinstance(pilot.app.screen, QuestionOverlay))
-        await settled(pilot)
+        for is_grave in (False, True):
+            gate = AcceptanceGate(
+                name="far",
+                passed=not is_grave,
+                sentence="Far. " * 40,
+                needs_person=True,
+                needs_cell_name=True,
+            )
+            change = PendingChange((gate,), "-  old\n+  new\n" * 100)
+            run.ask(ask_approval(change, cell=cell.settings.name))
+            await until_shown(pilot, "+  new")
+            await settled(pilot)
+            last = pilot.app.screen.query("Input" if is_grave else ".choice").last()
+            assert 0 < last.region.height <= last.region.bottom <= 24
+            assert pilot.app.screen.get_widget_at(last.region.x, last.region.bottom - 1)[0] is last
+            if not is_grave:
+                run.close_question()
+                await until(lambda: not isinstance(pilot.app.screen, QuestionOverlay))
         field = pilot.app.screen.query_one(Input)
         field.post_message(Paste("y\n" * 2500))
         for size in SIZES:
@@ -68,18 +81,3 @@ async def test_what_is_pasted_into_a_name_is_no_consent(cell, history, opened) -
         field.post_message(Paste(f"{cell.settings.name}\n"))
         await press(pilot, "enter")
         await until(lambda: len(run.given) == 1)
-
-
-async def test_each_way_to_quit_asks_about_the_run(cell, history, opened) -> None:
-    run = ToldRun()
-    async with opened(workplace_of(cell, run, history[:300])) as pilot:
-        await until_shown(pilot, "point 5")
-        for key in ("q", "ctrl+q"):
-            await press(pilot, key, key)
-            await until(lambda: isinstance(pilot.app.screen, ConfirmOverlay))
-            assert [type(one) for one in pilot.app.screen_stack].count(ConfirmOverlay) == 1
-            await press(pilot, "escape")
-        await press(pilot, "ctrl+c")
-        [notice] = pilot.app._notifications
-        assert notice.message.startswith("q leaves; what becomes of a run")
-        assert run.left == []

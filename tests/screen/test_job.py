@@ -13,11 +13,10 @@ from hexacell.run_process import messages
 from hexacell.run_process.client import LOST
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.child import Preflight
-from hexacell.screen.overlays import FaultOverlay, QuestionOverlay
+from hexacell.screen.overlays import ConfirmOverlay, FaultOverlay, QuestionOverlay
 from hexacell.screen.widgets import TextList, TextPanel
 from hexacell.text.screens.measuring import RESUMABLE
 from hexacell.text.screens.views import ChecklistItem, Mark
-from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Abort, Answer, MeasureAgain, Pause, Resume, Undo
 from procedures.run.keys import Phase, SetKey
@@ -125,22 +124,7 @@ async def test_one_key_each_for_who_is_in_control(cell, run, history, opened) ->
         assert run.taken == 1
 
 
-@pytest.mark.parametrize("is_grave", [False, True])
-async def test_a_long_change_leaves_in_sight_what_to_press(is_grave, cell, run, history, opened) -> None:
-    gate = AcceptanceGate(
-        name="far", passed=not is_grave, sentence="Far. " * 40, needs_person=True, needs_cell_name=True
-    )
-    async with opened(workplace_of(cell, run, history[:PROPOSED])) as pilot:
-        run.ask(ask_approval(PendingChange((gate,), "-  old\n+  new\n" * 100), cell=cell.settings.name))
-        await until_shown(pilot, "+  new")
-        await settled(pilot)
-        last = pilot.app.screen.query("Input" if is_grave else ".choice").last()
-        assert last.region.height > 0
-        assert last.region.bottom <= 24
-        assert pilot.app.screen.get_widget_at(last.region.x, last.region.bottom - 1)[0] is last
-
-
-async def test_motion_begins_on_an_explicit_yes_and_a_recovery_has_a_number(cell, run, history, opened):
+async def test_motion_begins_on_an_explicit_yes_and_a_fault_says_what_to_do(cell, run, history, opened):
     async with opened(workplace_of(cell, run, history[:300])) as pilot:
         run.ask(ask_startup(StartupAction.SWITCH_ON, "the machine is off", is_theirs=False))
         await until_shown(pilot, "Is nobody within its reach? Switch the machine on?")
@@ -149,19 +133,15 @@ async def test_motion_begins_on_an_explicit_yes_and_a_recovery_has_a_number(cell
         await press(pilot, "y")
         run.close_question()
         await until(lambda: not isinstance(pilot.app.screen, QuestionOverlay))
-        run.ask(ask_recovery("gauge y answers in inch. Press the in/mm key", (Action.RETRY, Action.ABORT)))
-        await until_shown(pilot, "retry: try the same again")
-        await press(pilot, "1")
-        assert run.given == [Answer("yes"), Answer("retry")]
-
-
-async def test_each_fault_is_shown_with_what_to_do(cell, run, history, opened) -> None:
-    async with opened(workplace_of(cell, run, history[:300])) as pilot:
         run.record([tripped_by(Guard.GAUGE_END)])
         await until_shown(pilot, f"Stopped by a guard: {Guard.GAUGE_END.value}")
         assert "What to do: Mend it" in shown(pilot)
         await press(pilot, "enter")
         assert not isinstance(pilot.app.screen, FaultOverlay)
+        run.ask(ask_recovery("gauge y answers in inch. Press the in/mm key", (Action.RETRY, Action.ABORT)))
+        await until_shown(pilot, "retry: try the same again")
+        await press(pilot, "1")
+        assert run.given == [Answer("yes"), Answer("retry")]
 
 
 def tripped_by(guard: Guard) -> events.Tripped:
@@ -218,31 +198,30 @@ async def test_the_end_of_a_run_is_a_single_fault_and_it_is_not_shown_as_running
 @pytest.mark.parametrize(
     ("key", "keeps_running"), [("l", True), pytest.param("s", False, marks=pytest.mark.slow)]
 )
-async def test_quitting_asks_what_becomes_of_the_run(key, keeps_running, cell, run, history, opened):
+async def test_each_way_to_quit_asks_about_the_run(key, keeps_running, cell, run, history, opened) -> None:
     async with opened(workplace_of(cell, run, history[:300])) as pilot:
         await until_shown(pilot, "point 5")
-        await press(pilot, "q", "escape")
+        for way in ("q", "ctrl+q"):
+            await press(pilot, way, way)
+            await until(lambda: isinstance(pilot.app.screen, ConfirmOverlay))
+            assert [type(one) for one in pilot.app.screen_stack].count(ConfirmOverlay) == 1
+            await press(pilot, "escape")
+        await press(pilot, "ctrl+c")
+        [notice] = pilot.app._notifications
+        assert notice.message.startswith("q leaves; what becomes of a run")
         assert run.left == []
         await press(pilot, "q", key)
         await until(lambda: run.left == [keeps_running])
 
 
-async def test_a_run_begins_after_everything_was_looked_at(cell, run, opened) -> None:
+async def test_a_run_begins_once_everything_holds_that_must_hold(cell, run, opened) -> None:
     run.begin(cell)
+    found = ChecklistItem(Mark.FAILED, "gauge y", "it answers in inch", "Press the in/mm key")
     workplace = ToldWorkplace(cell, live=[snapshot()], started=run)
+    holds, workplace.preflight = workplace.preflight, Preflight(items=(found,), is_ready=False)
     async with opened(workplace) as pilot:
         await press(pilot, "p", "u", "m", "a")  # these do nothing without a run
         assert not isinstance(pilot.app.screen, FaultOverlay)
-        await press(pilot, "2", "s")
-        await until_shown(pilot, "calibration")
-        assert workplace.begun == workplace.checked == ["optimise"]
-        assert pilot.app.current_mode == "measure"
-
-
-async def test_no_run_begins_while_something_does_not_hold(cell, run, opened) -> None:
-    found = ChecklistItem(Mark.FAILED, "gauge y", "it answers in inch", "Press the in/mm key")
-    workplace = ToldWorkplace(cell, started=run, preflight=Preflight(items=(found,), is_ready=False))
-    async with opened(workplace) as pilot:
         await press(pilot, "2")
         for key in ("s", "k", "K", "r", "l", "L"):
             await press(pilot, key)
@@ -254,3 +233,8 @@ async def test_no_run_begins_while_something_does_not_hold(cell, run, opened) ->
         assert "NO  gauge y: it answers in inch" in listed
         assert "-> Press the in/mm key" in listed
         assert workplace.begun == []
+        workplace.preflight = holds
+        await press(pilot, "s")
+        await until_shown(pilot, "calibration")
+        assert workplace.begun == ["optimise"]
+        assert pilot.app.current_mode == "measure"

@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from textual.widgets import Input
 
 from hexacell.cell.limits import ExclusionSettings
-from hexacell.cell.loader import Cell
+from hexacell.cell.loader import Cell, load_cell
+from hexacell.errors import FileError
 from hexacell.kinematics.pose import Pose
 from hexacell.run_process.messages import StatusChanged
 from hexacell.screen.app import TechnicianApp
@@ -27,16 +27,16 @@ from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import PendingChange, ask_approval, ask_placement
 from procedures.run.trips import Guard
 from procedures.steps import events
-from tests.screen.conftest import SNAPSHOTS, UPDATE, compare_with_snapshot, settled
+from tests.screen.conftest import SNAPSHOTS, UPDATE, compare_with_snapshot
 from tests.screen.test_found_terms import told
-from tests.screen.test_job import until_shown, workplace_of
+from tests.screen.test_job import press, until_shown, workplace_of
 from tests.screen.test_plan_screen import tried
 from tests.screen.told_run import ToldRun, ToldWorkplace, past_run, snapshot
 from tests.waiting import until
 
 SIZES = {"80x24": (80, 24), "140x40": (140, 40)}
 COLOURED = {"cell", "review", "history", "approve", "fault"}
-"""Scenes that have every colour of a theme between them: at the larger size compared in all themes."""
+"""Pictures that have every colour of a theme between them: at the larger size compared in all themes."""
 
 MEASURED = 262
 """Events until the fourth point is nearly measured; PROPOSED until the change waits for approval."""
@@ -97,8 +97,10 @@ def running(cell: Cell, history: History, count: int) -> tuple[ToldRun, ToldWork
 
 
 History = tuple[events.Event, ...]
-Opening = tuple[ToldWorkplace, tuple[str, ...]]
-"""What is shown, and the keys that lead there."""
+Pictures = dict[str, tuple[str, ...]]
+"""Keys that lead to each picture from the one before."""
+
+Opening = tuple[ToldWorkplace, Pictures]
 
 
 def scene_plan(cell: Cell, _: History) -> Opening:
@@ -107,7 +109,7 @@ def scene_plan(cell: Cell, _: History) -> Opening:
     exclusions = (ExclusionSettings(pose=pose, within_deg=5.0), ExclusionSettings(point=4))
     workplace.plan = plan
     workplace.cell = replace(cell, settings=cell.settings.model_copy(update={"exclusions": exclusions}))
-    return workplace, ("2", "x", "down", "down", "down")
+    return workplace, {"plan": ("2", "x", "down", "down", "down")}
 
 
 def scene_measure(cell: Cell, history: History) -> Opening:
@@ -115,13 +117,13 @@ def scene_measure(cell: Cell, history: History) -> Opening:
     target = cell.settings.identification.model_copy(update={"target_mm": 0.1})
     settings = cell.settings.model_copy(update={"identification": target})
     workplace.cell = replace(cell, settings=settings)
-    return workplace, ("3",)
+    return workplace, {"measure": ("3",), "digits": ("d",), "help": ("escape", "question_mark")}
 
 
 def scene_review(cell: Cell, history: History) -> Opening:
     run, workplace = running(cell, told(history), len(history))
     run.tell(StatusChanged(status=Status.ENDED))
-    return workplace, ("4",)
+    return workplace, {"review": ("4",)}
 
 
 def scene_place(cell: Cell, history: History) -> Opening:
@@ -130,7 +132,7 @@ def scene_place(cell: Cell, history: History) -> Opening:
         snapshot(x={"shown_mm": -1.2}, z={"shown_mm": None, "age_s": None, "problem": "gauge z: silent"})
     )
     run.ask(ask_placement(SetKey(phase=Phase.IDENTIFY, point=1), Pose(0.0, 0.0, 550.0)))
-    return workplace, ()
+    return workplace, {"place": ()}
 
 
 def scene_approve(cell: Cell, history: History) -> Opening:
@@ -145,7 +147,7 @@ def scene_approve(cell: Cell, history: History) -> Opening:
     )
     gates = tuple(far if gate.name == far.name else gate for gate in proposed.gates)
     run.ask(ask_approval(PendingChange(gates, DIFF, proposed.displacement), cell=cell.settings.name))
-    return workplace, ()
+    return workplace, {"approve": ()}
 
 
 def scene_fault(cell: Cell, history: History) -> Opening:
@@ -153,27 +155,27 @@ def scene_fault(cell: Cell, history: History) -> Opening:
     problem = "its plunger is at the end of its travel"
     action = "Move the gauge by 3.8 mm along +y, then answer the question"
     run.record([events.Tripped(guard=Guard.GAUGE_END, device="gauge y", problem=problem, action=action)])
-    return workplace, ()
+    return workplace, {"fault": ()}
 
 
 SCENES: dict[str, Callable[[Cell, History], Opening]] = {
-    "cell": lambda cell, _: (idle(cell), ("1",)),
-    "preflight": lambda cell, _: (idle(cell), ("2", "v", "enter")),
+    "idle": lambda cell, _: (
+        idle(cell),
+        {"cell": ("1",), "preflight": ("2", "v", "enter"), "history": ("5", "v")},
+    ),
     "plan": scene_plan,
     "measure": scene_measure,
-    "begun": lambda cell, history: (running(cell, history, 16)[1], ("3",)),
+    "begun": lambda cell, history: (running(cell, history, 16)[1], {"begun": ("3",)}),
     "review": scene_review,
-    "history": lambda cell, _: (idle(cell), ("5", "v")),
     "place": scene_place,
     "approve": scene_approve,
     "fault": scene_fault,
-    "digits": lambda cell, history: (running(cell, history, MEASURED)[1], ("d",)),
-    "help": lambda cell, history: (running(cell, history, MEASURED)[1], ("question_mark",)),
 }
 
 
+@pytest.mark.sample("80x24")
 @pytest.mark.parametrize("size", SIZES)
-async def test_the_assistant_looks_as_it_did(size: str, tmp_path: Path) -> None:
+async def test_the_assistant_looks_as_it_did_and_leaving_it_writes_nothing(size, tmp_path) -> None:
     path = tmp_path / "cell.toml"
     app = TechnicianApp(lambda: pytest.fail("there is no cell"), first_cell=path)
     async with app.run_test(size=SIZES[size]) as pilot:
@@ -183,20 +185,23 @@ async def test_the_assistant_looks_as_it_did(size: str, tmp_path: Path) -> None:
         await pilot.press("enter")
         await until_shown(pilot, "must be text that is not empty")
         await compare_with_snapshot(f"assistant-{size}-dark", pilot)
+        await pilot.press("x", "enter", "ctrl+q")
+        await until(lambda: app.return_code is not None)
+    with pytest.raises(FileError, match="does not exist"):
+        load_cell(path)
 
 
 @pytest.mark.sample("*-80x24")
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("scene", SCENES)
 async def test_it_looks_as_it_did(scene, size, cell, history, opened) -> None:
-    workplace, keys = SCENES[scene](cell, history)
+    workplace, pictures = SCENES[scene](cell, history)
     async with opened(workplace, SIZES[size]) as pilot:
-        for key in keys:
-            await pilot.press(key)
-            await settled(pilot)
-        for theme in THEMES if scene in COLOURED and size != "80x24" else THEMES[:1]:
-            pilot.app.theme = theme
-            await compare_with_snapshot(f"{scene}-{size}-{theme}", pilot)
+        for picture, keys in pictures.items():
+            await press(pilot, *keys)
+            for theme in reversed(THEMES if picture in COLOURED and size != "80x24" else THEMES[:1]):
+                pilot.app.theme = theme
+                await compare_with_snapshot(f"{picture}-{size}-{theme}", pilot)
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,9 @@ from procedures.journal.journal import encode, read_entries
 from procedures.steps import events
 
 
-@pytest.fixture
-def manipulated(demo, tmp_path):
-    """The demo's journal with another verdict and other words, all checksums right."""
+@pytest.mark.slow
+def test_a_manipulated_journal_is_different_and_the_record_is_named(typed_here, demo, tmp_path):
+    """Another verdict and other words, all checksums right."""
     entries = list(read_entries(demo.run / "journal.jsonl"))
     for place, entry in enumerate(entries):
         if isinstance(entry.event, events.ResultValidated):
@@ -20,12 +20,6 @@ def manipulated(demo, tmp_path):
             line = entry.number
     path = tmp_path / "journal.jsonl"
     path.write_bytes(b"".join(map(encode, entries)))
-    return path, line
-
-
-@pytest.mark.slow
-def test_a_manipulated_journal_is_different_and_the_record_is_named(typed_here, manipulated):
-    path, line = manipulated
     outcome = typed_here("replay", path, "--only", "results", "--json")
     assert outcome.code == 1
     first, *others, verdict = outcome.err.splitlines()

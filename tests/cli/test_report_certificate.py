@@ -122,7 +122,7 @@ def test_it_says_of_what_by_what_and_by_which_rule(certificate, run, typed_here)
     assert root.find(".//dcc:influenceCondition", NAMES) is not None
 
 
-def test_children_stand_in_the_order_of_the_schema(certificate) -> None:
+def test_children_stand_in_the_order_of_the_schema_and_no_text_is_empty(certificate) -> None:
     root = ET.parse(certificate).getroot()
     checked = set()
     for element in root.iter():
@@ -134,9 +134,6 @@ def test_children_stand_in_the_order_of_the_schema(certificate) -> None:
                 del order[: order.index(local(child)) + 1]
     assert checked == set(SEQUENCES)
     assert root.get("schemaVersion") == "3.3.0"
-
-
-def test_no_text_is_empty_and_each_has_its_language(certificate) -> None:
     root = ET.parse(certificate).getroot()
     for element in root.iter():
         if len(element) == 0:

@@ -1,4 +1,4 @@
-"""A run that is stopped, and resumed with the command that it printed."""
+"""A run that ends early says what is left and unverified, and is resumed with the command it printed."""
 
 import os
 import shlex
@@ -10,8 +10,19 @@ import time
 
 import pytest
 
+from hexacell.cell.loader import load_cell
+from hexacell.cli.commands.run import execute_run
+from hexacell.cli.console import Console
+from hexacell.errors import CellBusy
+from hexacell.runs.cell_lock import cell_lock
+from hexacell.runs.run_folder import RunFolder
+from hexacell.services.run.calibration_run import RunRequest
+from procedures.calibration.calibration import Mode
+from procedures.engine.commands import UnattendedOperator
 from procedures.journal.journal import read_entries, read_journal
 from procedures.steps import events
+from procedures.steps.roll_back import RollBack
+from tests.recorded_events import record
 from tests.signals import terminal_signals
 
 STEPS_TO_STOP = 2  # that begin at most after a signal: it ends a run of dozens between two steps
@@ -129,3 +140,21 @@ def test_a_robot_that_could_not_be_stopped_is_the_first_thing_said(typed_here, g
     said = outcome.err
     assert said.index("PRESS THE EMERGENCY STOP. The robot could not be") < said.index("Stopped; what was")
     assert outcome.document["error"].startswith("PRESS THE EMERGENCY STOP")
+
+
+COMMITTED = events.Committed(approved_by="a tester")
+WITHDRAWN = [events.StepBegun(step=RollBack()), events.RolledBack()]
+UNVERIFIED = "The controller's config holds the new geometry, which is not verified yet"
+
+
+@pytest.mark.parametrize(("history", "is_said"), [([COMMITTED], True), ([COMMITTED, *WITHDRAWN], False)])
+def test_an_unverified_geometry_is_always_reported(cell_folder, capsys, history, is_said: bool) -> None:
+    """Also if resuming fails before the engine runs."""
+    folder = RunFolder(cell_folder.path / "run")
+    folder.path.mkdir()
+    record(folder.journal, history)
+    cell = load_cell(cell_folder.cell)
+    order = RunRequest(cell, folder, Mode.OPTIMISE, UnattendedOperator(), unattended=True, resume=True)
+    with cell_lock(cell.config_path), pytest.raises(CellBusy):
+        execute_run(order, Console())
+    assert (UNVERIFIED in capsys.readouterr().err) == is_said

@@ -20,7 +20,7 @@ def entry(data, time_s=1.5):
     return TraceEntry(time_s, "/dev/ttyUSB0", TrafficDirection.SENT, data)
 
 
-def test_the_latest_bytes_are_kept_and_the_rest_is_counted():
+def test_the_latest_bytes_are_kept_and_the_rest_is_counted() -> None:
     trace = WireTrace(capacity=2 * (ENTRY_BYTES + 4))
     for number in range(5):
         trace(entry(b"abcd", number))
@@ -28,9 +28,6 @@ def test_the_latest_bytes_are_kept_and_the_rest_is_counted():
     assert trace.dropped == {"/dev/ttyUSB0": 3}
     assert trace.text().splitlines()[0] == "# 3 earlier entries of /dev/ttyUSB0 were forgotten"
     assert len(trace.text().splitlines()) == 3
-
-
-def test_more_than_fits_at_once_is_not_kept():
     trace = WireTrace(capacity=ENTRY_BYTES + 3)
     trace(entry(b"abcd"))
     assert trace.entries() == ()

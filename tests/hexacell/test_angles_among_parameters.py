@@ -48,14 +48,11 @@ def test_a_difference_of_an_angle_counts_in_mrad(robot: Robot) -> None:
     assert changed(robot, "S2x", 0.004).largest_difference(robot.drawing) == pytest.approx(0.004)
 
 
-def test_robots_within_their_tolerances_are_not_refused(robot: Robot) -> None:
+def test_robots_within_their_tolerances_are_not_refused_and_a_rail_beyond_is_named(robot: Robot) -> None:
     random = np.random.default_rng(8)
     for _ in range(4):
         built = random_robot(robot.mechanism, robot.drawing, robot.tolerances, random)
         assert robot.tolerance_violations(identified(robot, built).estimate) == ()
-
-
-def test_a_rail_that_leans_by_twice_its_tolerance_is_named(robot: Robot) -> None:
     built = changed(robot, "rail5b", 0.006)
     (violation,) = robot.tolerance_violations(identified(robot, built).estimate)
     assert violation.name == "rail5b"

@@ -13,28 +13,20 @@ PROBABILITIES = st.floats(1e-6, 1.0 - 1e-6)
 
 
 @given(PROBABILITIES)
-def test_two_squares_are_exponential(exceeded: float) -> None:
+def test_one_square_is_normal_and_two_are_exponential_and_limits_are_exceeded_as_often(exceeded) -> None:
     limit = distributions.chi_square_limit(2, exceeded)
     assert limit == pytest.approx(-2.0 * math.log(exceeded), rel=1e-9)
     assert distributions.chi_square_exceedance(2, limit) == pytest.approx(exceeded, rel=1e-9)
-
-
-@given(PROBABILITIES)
-def test_one_square_is_of_a_normal_variable(exceeded: float) -> None:
     limit = distributions.normal_limit(0.5 * exceeded)
     assert distributions.chi_square_limit(1, exceeded) == pytest.approx(limit**2, rel=1e-6, abs=1e-12)
+    below = distributions.normal_probability(np.array([-distributions.normal_limit(exceeded)]))
+    assert below == pytest.approx([exceeded], rel=1e-9)
 
 
 @given(st.lists(st.floats(-8.0, 8.0), min_size=1))
 def test_the_normal_probability_is_the_error_function(values: list[float]) -> None:
     expected = [0.5 * math.erfc(-value / math.sqrt(2.0)) for value in values]
     assert distributions.normal_probability(np.array(values)) == pytest.approx(expected, rel=1e-9)
-
-
-@given(PROBABILITIES)
-def test_a_normal_limit_is_exceeded_as_often(exceeded: float) -> None:
-    below = distributions.normal_probability(np.array([-distributions.normal_limit(exceeded)]))
-    assert below == pytest.approx([exceeded], rel=1e-9)
 
 
 @given(st.floats(-1e3, 1e3))

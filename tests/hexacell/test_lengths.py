@@ -37,20 +37,14 @@ def test_no_length_but_nought_is_shown_as_nought(mm, text) -> None:
     assert shown(mm) == text
 
 
-def test_before_and_after() -> None:
+def test_lengths_are_told_with_the_digits_that_count() -> None:
     assert from_to(3.7412, 0.1503, 2) == "3.74 -> 0.150 mm"
     assert from_to(0.0213, 0.00041) == "0.021 mm -> 0.41 um"
-
-
-def test_an_error_with_its_limit() -> None:
     error = JudgedError.of(LargestError(0.0004, 0.003), 0.02, 1.5)
     assert error.sentence("mm") == "0.40 +- 3.00 um (limit 20)"
     coarse = JudgedError.of(LargestError(0.0004, 0.05), 0.3, 1.0)
     assert coarse.sentence("mm") == "0.000 +- 0.050 mm (limit 0.3)"
     assert figure_with_u(0.0004, 0.003) == "0.40 +- 3.00 um"
-
-
-def test_a_parameter_that_is_known_to_less_than_a_micrometre() -> None:
     (row,) = rows_of_changes([ParameterDifference("l1", "mm", 580.0, 580.00031, 0.0002)])
     assert [row.figure(one) for one in (row.new, row.change, row.sigma)] == [
         "580.00031",

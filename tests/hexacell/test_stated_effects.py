@@ -49,14 +49,11 @@ def test_every_size_of_the_section_belongs_to_one_effect(ideal) -> None:
     assert named == set(zeros) - of_noise
 
 
-def test_the_scale_of_the_gauges_is_that_of_the_noise_and_estimated(ideal) -> None:
+def test_the_scale_of_the_gauges_is_estimated_and_sources_go_with_the_effects(ideal) -> None:
     noisy = ideal.model_copy(update={"noise": ideal.noise.model_copy(update={"gauge_scale": 0.002})})
     (scale,) = (effect for effect in stated_effects(noisy) if effect.is_estimated)
     assert (scale.name, scale.size, scale.unit) == ("scale of each gauge", 2.0, "um/mm")
     assert scale.occurrence is Occurrence.MEASURING
-
-
-def test_sources_go_with_the_effects(ideal) -> None:
     stated = with_sizes(ideal, sources={"load_n": "spindle"}, rail_wave_short_um=1.0)
     sources = {effect.name: effect.source for effect in stated_effects(stated)}
     assert sources["load at work"] == "spindle"
@@ -64,13 +61,10 @@ def test_sources_go_with_the_effects(ideal) -> None:
     assert sources["sag common to all rails"] == "assumed: precision"
 
 
-def test_thermometers_replace_the_stated_change_of_temperature(ideal) -> None:
+def test_thermometers_take_the_place_of_temperature_and_of_expansion(ideal) -> None:
     effects = stated_effects(with_sizes(ideal), measured_range_k=0.3)
     (drift,) = (effect for effect in effects if effect.name == "temperature while measuring")
     assert (drift.size, drift.source) == (0.3, "thermometers")
-
-
-def test_what_thermometers_on_legs_do_not_tell_takes_the_place_of_their_expansion(ideal) -> None:
     stated = with_sizes(ideal, thermometers_k=0.2)
     alone = {effect.name: effect for effect in stated_effects(stated, 6.0, {MachinePart.LEGS})}
     assert alone["thermometers of the legs"].size == 0.2

@@ -23,10 +23,7 @@ def test_every_field_has_a_meaning_and_every_number_a_unit(heading, fields):
         assert unit or not NUMBERS.search(QUOTED.sub("", words)), name
 
 
-def test_no_field_is_described_that_the_journal_does_not_have():
+def test_no_other_field_is_described_nor_another_version() -> None:
     used = {field_key(heading, name, MEANINGS) for heading, fields in FIELDS.items() for name in fields}
     assert set(MEANINGS) == used
-
-
-def test_the_version_is_the_one_that_is_written():
     assert f"`version` is {VERSION}" in PAGE

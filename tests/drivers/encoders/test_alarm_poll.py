@@ -53,15 +53,12 @@ def sample(bus: SlowBus, poll: AlarmPoll) -> None:
     poll.check()
 
 
-def test_samples_without_a_pause_leave_it_a_small_share_of_the_bus(bus):
+def test_samples_leave_it_a_small_share_of_the_bus_and_each_pause(bus) -> None:
     poll = AlarmPoll(bus.nodes, [])
     begun_s, bus.read_s = bus.now_s, 0.0
     while bus.now_s < begun_s + 20.0:
         sample(bus, poll)
     assert 0.8 * alarm_poll.BUS_SHARE < bus.read_s / (bus.now_s - begun_s) <= alarm_poll.BUS_SHARE
-
-
-def test_samples_with_pauses_are_each_followed_by_it(bus):
     poll = AlarmPoll(bus.nodes, [])
     for _ in range(20):
         bus.now_s += alarm_poll.ALARM_PERIOD_S

@@ -26,7 +26,7 @@ def settings(**changes: object) -> LinearEncoderSettings:
     )
 
 
-async def test_positions_are_what_the_controller_tells_and_counts_give_them_again() -> None:
+async def test_positions_are_what_the_controller_tells_in_the_cell_files_direction_and_offset() -> None:
     own = settings()
     bank = ControllerScales(own, Controller())
     assert [one.name for one in await bank.open()] == [f"encoder of leg {leg}" for leg in range(1, 7)]
@@ -34,9 +34,6 @@ async def test_positions_are_what_the_controller_tells_and_counts_give_them_agai
     assert sample.positions == pytest.approx(JOINTS, abs=5e-7)
     assert joint_variables(sample.counts, own) == sample.positions, "as a replay computes them"
     await bank.close()
-
-
-async def test_direction_and_offset_are_those_of_the_cell_file() -> None:
     own = settings(direction=(1, -1, 1, 1, 1, 1), offset_mm=(0, 0, 0, 0, 0, 10), measuring_step_nm=1000)
     sample = await ControllerScales(own, Controller()).read()
     assert sample.counts[1] == 455742

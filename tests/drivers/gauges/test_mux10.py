@@ -25,11 +25,6 @@ async def opened(dialogue, gauge):
     return gauge
 
 
-@pytest.fixture
-def no_pause(monkeypatch):
-    monkeypatch.setattr(Mux10Gauge, "busy_pause_s", 0.0)
-
-
 # Frames
 
 
@@ -56,14 +51,12 @@ async def test_a_multiplexer_without_identification_is_accepted(dialogue, gauge)
     await gauge.check()
 
 
-async def test_requests_to_a_busy_multiplexer_are_repeated(dialogue, opened, no_pause):
+async def test_a_busy_multiplexer_is_asked_again_unless_it_stays_busy(dialogue, opened, monkeypatch):
+    monkeypatch.setattr(Mux10Gauge, "busy_pause_s", 0.0)
     dialogue.expect(
         (b"2\r", b"918\r"), (b"2\r", b"918\r"), (b"2\r", VALUE), (b"2\r", b"918\r"), (b"2\r", VALUE)
     )
     assert (await opened.read()).value_mm == 0.123
-
-
-async def test_a_multiplexer_that_stays_busy_is_an_error(dialogue, opened, no_pause):
     dialogue.expect(*[(b"2\r", b"918\r")] * mux10.BUSY_TRIES)
     with pytest.raises(DeviceError, match=r"gauge y: its multiplexer stays busy \(918\)"):
         await opened.read()

@@ -97,16 +97,13 @@ def load_fixture(cell_text, load_text):
     return load
 
 
-def test_what_is_not_said_is_assumed_as_of_a_shop(load_fixture) -> None:
+def test_what_is_not_said_is_assumed_as_of_a_shop_and_a_direction_has_any_length(load_fixture) -> None:
     fixture = load_fixture().settings.length_check
     assert fixture.second_seat == pytest.approx((150.012, 0.0, 500.0))
     assert (fixture.parallel_mrad, fixture.height_mm, fixture.seating_um) == (0.1, 50.0, 5.0)
     assert (fixture.temperature_sigma_k, fixture.expansion_um_m_k) == (1.0, 11.5)
     assert (fixture.mountings, fixture.mounting) == (3, "by-hand")
     assert "distance_mm = 300.012  # line" in describe(load_fixture())
-
-
-def test_a_direction_is_one_whatever_its_length(load_fixture) -> None:
     fixture = load_fixture(more="direction = [0.0, 3.0, 4.0]\nrepeats = 3\n").settings.length_check
     assert fixture.second_seat == pytest.approx((-150.0, 180.0072, 740.0096))
     assert fixture.mountings == 7

@@ -80,19 +80,12 @@ def test_a_provisional_geometry_has_all_parameters(cell_with) -> None:
 STATED = "encoder_mm = 0.01\ngauge_mm = 0.01\n"
 
 
-@pytest.fixture
-def load_noise(load_changed):
-    return lambda lines: load_changed((STATED, lines)).settings
-
-
-def test_one_figure_is_that_of_all_instruments_of_a_kind(load_noise) -> None:
-    noise = noise_of(load_noise("encoder_mm = 0.02\ngauge_mm = 0.005\n"))
+def test_one_figure_is_that_of_all_instruments_or_each_has_its_own(load_changed) -> None:
+    noise = noise_of(load_changed((STATED, "encoder_mm = 0.02\ngauge_mm = 0.005\n")).settings)
     assert noise.encoders.tolist() == [0.02] * 6
     assert noise.gauges_mm.tolist() == [0.005] * 3
-
-
-def test_each_instrument_may_have_its_own(load_noise) -> None:
-    noise = noise_of(load_noise("gauges_mm = [0.01, 0.03, 0.01]\nencoder_mm = 0.02\n"))
+    own = "gauges_mm = [0.01, 0.03, 0.01]\nencoder_mm = 0.02\n"
+    noise = noise_of(load_changed((STATED, own)).settings)
     assert noise.gauges_mm.tolist() == pytest.approx([0.01, 0.03, 0.01])
     assert noise.encoders.tolist() == pytest.approx([0.02] * 6)
 

@@ -123,16 +123,13 @@ def test_a_damaged_note_is_told(bench: Bench, text: bytes) -> None:
         settle_interrupted_write(bench.files)
 
 
-def test_a_link_in_the_note_s_place_leads_nowhere(bench: Bench, tmp_path: Path) -> None:
+def test_the_note_is_no_link_and_no_more_readable_than_the_files(bench: Bench, tmp_path: Path) -> None:
     precious = tmp_path / "precious"
     precious.write_bytes(b"precious")
     note_path(bench.files).symlink_to(precious)
     with pytest.raises(FileError, match="is a link"):
         bench.commit(tmp_path / "run")
     assert (precious.read_bytes(), bench.found) == (b"precious", bench.before)
-
-
-def test_the_note_is_no_more_readable_than_the_files(bench: Bench) -> None:
     bench.files[1].chmod(0o600)
     note_write(bench.files, bench.before, bench.after)
     assert note_path(bench.files).stat().st_mode & 0o077 == 0

@@ -149,13 +149,10 @@ def test_a_broken_mechanism_is_refused(broken: type[GoughStewart]) -> None:
         all_of(suite(broken()))[BREAKS[broken]]()
 
 
-def test_records_of_wrong_derivatives_are_not_identified() -> None:
+def test_wrong_derivatives_and_a_start_that_leads_nowhere_are_refused() -> None:
     with pytest.raises(AssertionError, match=r"off|not determined"):
         suite(WrongDerivative()).test_exact_records_are_identified()
-
-
-def test_a_start_that_leads_nowhere_is_refused() -> None:
-    """Poses beyond a singularity of the robots that are built."""
+    # Poses beyond a singularity of the robots that are built.
     far = replace(example(GoughStewart()), tolerances={"base": 400.0, "platform": 1.0, "offset": 1.0})
     made = type("Suite", (MechanismConformance,), {"example": far})()
     with pytest.raises(AssertionError, match=r"no pose within the tolerances|not equal"):

@@ -25,12 +25,9 @@ def scores() -> np.ndarray:
     return np.array(found)
 
 
-def test_they_are_standard_normal(scores) -> None:
+def test_they_are_standard_normal_and_independent_of_those_before(scores) -> None:
     assert np.abs(scores.mean(axis=0)).max() < 4.0 / np.sqrt(ROBOTS)
     assert np.abs(scores.std(axis=0) - 1.0).max() < 4.0 / np.sqrt(2 * ROBOTS)
-
-
-def test_they_are_independent_of_those_before(scores) -> None:
     products = np.einsum("rni,rmi->nm", scores, scores) / (ROBOTS * scores.shape[2])
     np.fill_diagonal(products, 0.0)
     assert np.abs(products).max() < 4.5 / np.sqrt(ROBOTS)

@@ -26,14 +26,11 @@ def crashed(*changes: tuple[int, float], seed: int = 0) -> tuple[StepAlarm, ...]
     return watch_runs(runs, CAUSES)[0]
 
 
-def test_a_crash_is_found_the_same_night_with_its_size_and_leg() -> None:
+def test_a_crash_is_found_the_same_night_and_the_watch_goes_on() -> None:
     (alarm,) = crashed((3, 30.0))
     assert (alarm.run, alarm.first, alarm.last, alarm.leg, alarm.cause) == (31, 31, 31, 2, 3)
     assert alarm.change == pytest.approx(30.0, abs=4 * alarm.sigma)
     assert (alarm.other_legs, alarm.or_causes) == ((), ())
-
-
-def test_the_watch_goes_on_after_an_alarm() -> None:
     first, second = crashed((3, 30.0), (0, -20.0))
     assert (first.leg, first.run) == (2, 31)
     assert (second.leg, second.run, second.first, second.cause) == (1, 61, 61, 0)
@@ -110,15 +107,12 @@ def test_alarms_come_as_the_runs_do() -> None:
     assert watch.share_of_limit.max() == 0.0
 
 
-def test_the_evidence_of_a_leg_is_that_of_all_its_parameters() -> None:
+def test_the_evidence_of_a_leg_is_of_all_its_parameters_and_all_it_may_be_are_named() -> None:
     sigmas = np.full(6, 0.01)
     assert possible_groups(np.array([5.0, 0, 0, 0, 0, 0]), sigmas, LEGS)[0] == 1
     assert possible_groups(np.array([5.0, 0, 4.9, 4.9, 0, 0]), sigmas, LEGS)[0] == 2
     unseen = np.where(LEGS == 3, np.inf, 0.01)
     assert possible_groups(np.array([5.0, 0, 0, 0, 0, 9.0]), unseen, LEGS)[0] == 1
-
-
-def test_as_many_legs_are_named_as_it_may_be() -> None:
     sigmas = np.full(6, 0.01)
     assert possible_groups(np.array([9.0, 0, 0, 0, 0, 0]), sigmas, LEGS) == (1,)
     assert possible_groups(np.array([5.0, 0, 4.9, 0, 0, 0]), sigmas, LEGS) == (1, 2)

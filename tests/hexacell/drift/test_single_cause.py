@@ -18,13 +18,10 @@ def outcome(seed: int, change: np.ndarray | None = None, records: int = 9) -> Si
     return single_cause_test(robot.records(robot.check[:records], state), COVARIANCE, CAUSES.by_state)
 
 
-def test_scores_are_standard_normal() -> None:
+def test_scores_are_standard_normal_and_a_change_is_estimated_with_its_sigma() -> None:
     scores = np.array([outcome(seed).scores for seed in range(100)])
     assert np.abs(scores.mean(axis=0)).max() < 0.3
     assert np.abs(scores.std(axis=0) - 1.0).max() < 0.22
-
-
-def test_a_change_is_estimated_with_its_sigma() -> None:
     change = np.array([0.0, 0.0, 0.0, 6.0, 0.0, 0.0])
     found = [outcome(seed, change) for seed in range(100)]
     errors = [(one.changes[3] - 6.0) / one.sigmas[3] for one in found]

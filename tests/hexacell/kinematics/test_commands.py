@@ -34,12 +34,9 @@ def test_the_command_computed_for_an_actual_pose_is_the_original_command(robot):
     np.testing.assert_allclose(commands.poses.rotations, COMMANDS.rotations[:2], atol=1e-10)
 
 
-def test_a_refused_command_is_not_taken(robot):
+def test_no_command_is_taken_that_was_refused_or_whose_joints_the_controller_cannot_take(robot) -> None:
     refusing = replace(robot, refused=RefusedCommands((RefusedCommand(COMMANDS.pose(1).as_tuple()),)))
     np.testing.assert_array_equal(refusing.actual_poses(COMMANDS).found, [True, False, False])
-
-
-def test_no_command_leads_to_joints_that_the_controllers_geometry_cannot_take(robot):
     actual = robot.actual_poses(COMMANDS[:1])
     beyond = actual.joints + np.array([400.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     assert not robot.commands_for(actual.poses, beyond).found.any()

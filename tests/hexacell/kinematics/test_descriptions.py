@@ -124,16 +124,13 @@ def test_rows_are_taken_from_positions_and_rotations_alike(rows, expected):
     assert [round(taken.pose(row).a) for row in range(len(taken))] == [all_of_them[n].a for n in expected]
 
 
-def test_tilt_is_the_angle_between_the_z_axes_whatever_the_turn_about_them():
+def test_tilt_is_between_the_z_axes_and_poses_that_differ_by_rounding_are_the_same() -> None:
     tilts = PoseBatch.of(
         [Pose(0, 0, 0), Pose(0, 0, 0, 30, 0, 70), Pose(0, 0, 0, 0, -40), Pose(0, 0, 0, 60, 60)]
     )
     np.testing.assert_allclose(
         np.degrees(tilts.tilts()), [0.0, 30.0, 40.0, np.degrees(np.arccos(0.25))], atol=1e-6
     )
-
-
-def test_poses_that_differ_by_rounding_alone_are_the_same():
     poses = PoseBatch.of(
         [Pose(1, 2, 3, 4, 5, 180), Pose(1, 2, 3 + 1e-9, 4, 5, -180), Pose(1, 2, 3, 4, 5, 179.99)]
     )

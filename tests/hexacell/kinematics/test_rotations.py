@@ -92,15 +92,10 @@ small = st.floats(-2.0 * SERIES, 2.0 * SERIES)
 
 
 @given(turn | small, turn | small)
-def test_axes_are_those_of_the_rotation_vector(a: float, b: float) -> None:
+def test_axes_are_those_of_the_rotation_vector_and_derivatives_those_of_the_axes(a, b) -> None:
     found = TurnedAxes.by(np.array([a, b]))
     turned = Rotation.from_rotvec([a, b, 0.0]).as_matrix()
     np.testing.assert_allclose(np.stack([found.u, found.w, found.axis], axis=-1), turned, atol=1e-12)
-
-
-@given(turn | small, turn | small)
-def test_derivatives_are_those_of_the_axes(a: float, b: float) -> None:
-    found = TurnedAxes.by(np.array([a, b]))
     for column, step in enumerate(1e-5 * np.eye(2)):
         after, before = (TurnedAxes.by(np.array([a, b]) + side * step) for side in (1.0, -1.0))
         np.testing.assert_allclose(found.by_turns[0][:, column], (after.u - before.u) / 2e-5, atol=1e-9)

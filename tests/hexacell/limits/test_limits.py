@@ -20,12 +20,9 @@ def of(*poses):
     return PoseBatch.of([Pose(0, 0, 550, *angles) for angles in poses])
 
 
-def test_tilt_and_turn_of_commands_are_limited():
+def test_tilt_and_turn_of_commands_are_limited_and_a_pose_at_a_limit_is_within_it() -> None:
     commands = of((44.9,), (45.1,), (0, -44.9), (0, 0, 59.9), (0, 0, -60.1), (30, 0, 59))
     np.testing.assert_array_equal(LIMITS.allow_commands(commands), [True, False, True, True, False, True])
-
-
-def test_a_pose_at_a_limit_is_within_it():
     assert LIMITS.allow_commands(of((45.0,), (0, 45.0), (0, 0, 60.0), (0, 0, -60.0))).all()
 
 
@@ -110,16 +107,13 @@ def limits(cone=30.0, distance=0.0):
     return LegLimits(down, down, np.full(6, np.radians(20.0)), np.full(6, np.radians(cone)), distance)
 
 
-def test_a_platform_joint_turns_as_far_as_the_platform_does():
+def test_a_platform_joint_turns_as_far_as_the_platform_does_but_not_about_its_leg() -> None:
     spare = np.degrees(limits().spare_angles(turned([1, 0, 0], 12.0)))
     np.testing.assert_allclose(spare[0, 0], 20.0, atol=1e-6)
     np.testing.assert_allclose(spare[0, 1], 18.0, atol=1e-6)
     assert are_kept(limits(), turned([1, 0, 0], 29.9))[0]
     assert not are_kept(limits(), turned([1, 0, 0], 30.1))[0]
     assert not are_kept(limits(), turned([1, 0, 0], 29.9), np.radians(0.2))[0]
-
-
-def test_a_turn_about_vertical_legs_turns_no_joint():
     np.testing.assert_allclose(np.degrees(limits().spare_angles(turned([0, 0, 1], 80.0)))[0, 1], 30.0)
 
 

@@ -43,17 +43,12 @@ small = st.floats(-20.0, 20.0)
 
 
 @given(st.builds(Pose, small, small, st.floats(540.0, 560.0), small, small, small))
-def test_no_piece_of_a_line_is_passed_faster_than_allowed(end: Pose) -> None:
+def test_the_fastest_piece_is_passed_as_fast_as_allowed_and_none_faster(end: Pose) -> None:
     duration_s = LINES.of(HOME, end, LIMITS)
     pieces = 24  # of the simulated controller; another number than the durations are found with
     joints, edge = passed(HOME, end, pieces)
     assert joints.max() * pieces / duration_s <= LIMITS.joint * (1.0 + 1e-6)
     assert edge.max() * pieces / duration_s <= LIMITS.edge_mm_s * (1.0 + 1e-6)
-
-
-@given(st.builds(Pose, small, small, st.floats(540.0, 560.0), small, small, small))
-def test_the_fastest_piece_is_passed_as_fast_as_allowed(end: Pose) -> None:
-    duration_s = LINES.of(HOME, end, LIMITS)
     if duration_s == SHORTEST_S:
         return
     joints, edge = passed(HOME, end, 48)
@@ -61,11 +56,8 @@ def test_the_fastest_piece_is_passed_as_fast_as_allowed(end: Pose) -> None:
     assert share.max() == pytest.approx(1.0)
 
 
-def test_a_move_to_where_the_robot_is_has_a_duration_too() -> None:
+def test_a_move_to_where_the_robot_is_has_a_duration_and_poses_out_of_reach_do_not_count() -> None:
     assert LINES.of(HOME, HOME, LIMITS) == SHORTEST_S
-
-
-def test_poses_out_of_reach_do_not_count() -> None:
     line = interpolate_line(PoseBatch.of([HOME]), PoseBatch.of([Pose(10.0, 0.0, 550.0)]), 4)
     joints = np.zeros((5, 6))
     joints[2, 3] = np.nan

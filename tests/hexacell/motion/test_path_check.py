@@ -25,15 +25,12 @@ def exactly(**change):
     return known(NOMINAL, limits=replace(LIMITS, **change))
 
 
-def test_all_six_numbers_are_interpolated_linearly():
+def test_all_six_numbers_are_interpolated_linearly_even_over_the_longer_arc() -> None:
     way = interpolate_line(at(0, 0, 500, -10, 0, 40), at(12, -24, 560, 14, 6, -8), pieces=4)
     numbers = [way.pose(row).as_tuple() for row in range(5)]
     np.testing.assert_allclose(numbers[0], (0, 0, 500, -10, 0, 40), atol=1e-9)
     np.testing.assert_allclose(numbers[1], (3, -6, 515, -4, 1.5, 28), atol=1e-9)
     np.testing.assert_allclose(numbers[4], (12, -24, 560, 14, 6, -8), atol=1e-9)
-
-
-def test_angles_are_interpolated_as_numbers_even_over_the_longer_arc():
     way = interpolate_line(at(0, 0, 550, 0, 0, 170), at(0, 0, 550, 0, 0, -170), pieces=2)
     assert way.pose(1).c == pytest.approx(0.0, abs=1e-9)
 
@@ -46,18 +43,15 @@ TURNED = FrameTransform(
 """As the frames of a drawing may be to those of the convention."""
 
 
-def test_angles_are_those_of_the_frames_in_which_the_controller_commands():
+def test_lines_are_those_of_the_frames_in_which_the_controller_commands() -> None:
     start, end = at(0, 0, 500, -10, 0, 40), at(12, -24, 560, 14, 6, -8)
     lines = interpolate_line(TURNED.poses(start), TURNED.poses(end), 4, TURNED)
     way = TURNED.inverse().poses(lines)
     for share, row in zip(np.linspace(0.0, 1.0, 5), way.numbers(), strict=True):
         expected = (1.0 - share) * start.numbers()[0] + share * end.numbers()[0]
         np.testing.assert_allclose(row, expected, atol=1e-9)
-
-
-def test_lines_are_checked_where_the_controller_moves():
-    """The robot's frames are another choice than the controller's, whose line is what is moved on."""
     start, end = at(0, 0, 550, -20, 15, 30), at(10, -20, 540, 15, -20, 10)
+    # The robot's frames are another choice than the controller's, whose line is what is moved on.
     belief = exactly(frames=TURNED)
     checked = LinesFrom(belief, TURNED.poses(start)).check(TURNED.poses(end))
     moved = TURNED.inverse().poses(checked.commands.in_shape(-1))
@@ -108,7 +102,7 @@ def test_the_line_is_clear_for_the_estimated_robot_too(know, paper):
     assert not is_clear(know(paper.actual), start, end)
 
 
-def test_the_travel_is_checked_along_the_line(know, paper):
+def test_the_travel_is_checked_along_the_line_around_the_reference_given(know, paper) -> None:
     """A robot with errors: a tilt of 10 deg takes the ball millimetres away from the reference."""
     real = know(paper.actual)
     start, end = at(0, 0, 550), at(0, 0, 550, 0, 0, 20)
@@ -116,9 +110,6 @@ def test_the_travel_is_checked_along_the_line(know, paper):
     assert is_clear(exactly(), start, end, where)
     assert is_clear(real, start, end)
     assert not is_clear(real, start, end, where)
-
-
-def test_the_travel_is_around_the_reference_given():
     start, end = at(0, 0, 550), at(4, 0, 550)
     assert is_clear(exactly(), start, end, np.array([0.0, 0.0, 550.0]))
     assert is_clear(exactly(), start, end, np.array([4.9, 0.0, 550.0]))

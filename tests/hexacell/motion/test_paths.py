@@ -106,12 +106,9 @@ def test_over_the_reference_the_ball_stays_inside_as_well(well, commands, home):
         assert farthest(well, line_of(path, start, commands[[row]])) <= TRAVEL_MM + 0.1
 
 
-def test_from_the_reference_itself_there_is_no_path_over_it(well, commands, home):
+def test_there_is_no_path_over_the_reference_from_itself_nor_from_out_of_reach(well, commands, home):
     paths = PathPlanner(well, home, None, BALL).options(commands)
     assert list(paths.via_reference(np.array([0, 1]))) == [None, None]
-
-
-def test_there_is_no_path_from_a_command_out_of_reach(well, commands):
     beyond = PoseBatch.at([0.0, 0.0, 5000.0], np.eye(3)[None])
     planner = PathPlanner(well, beyond, beyond, BALL)
     assert not any(planner.plan(commands))

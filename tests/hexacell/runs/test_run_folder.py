@@ -64,15 +64,12 @@ def test_every_part_of_a_run_has_a_wire_trace_of_its_own(cell: Cell, folder: Run
         path.touch()
 
 
-def test_a_run_is_found_by_its_folder_or_its_name(cell: Cell) -> None:
+def test_a_run_is_found_by_its_folder_or_name_and_is_none_without_a_journal(cell: Cell) -> None:
     run = new_run(cell)
     run.create(cell)
     run.journal.touch()
     assert find_run(cell, run.path.name) == run
     assert find_run(cell, str(run.path)) == run
-
-
-def test_a_folder_without_a_journal_is_no_run(cell: Cell) -> None:
     run = new_run(cell)
     run.create(cell)
     for named in (run.path.name, str(run.path), "", " ", "nonsense"):

@@ -93,12 +93,15 @@ def test_a_damaged_copy_is_not_restored(cell, runs, to) -> None:
     assert config(cell) == before
 
 
-def test_another_robots_run_is_refused(cell, runs, tmp_path) -> None:
+def test_another_robots_run_is_refused_and_a_cell_in_use_left_alone(cell, runs, tmp_path) -> None:
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     other = a_cell(elsewhere)
     with pytest.raises(UsageError, match="is of another config"):
         roll_back_config(other, str(runs[0].folder.path))
+    with cell_lock(cell.config_path), pytest.raises(CellBusy):
+        roll_back_config(cell)
+    assert config(cell) == runs[-1].after
 
 
 def test_a_provisional_geometry_is_taken_back_by_its_run(cell, runs) -> None:
@@ -107,9 +110,3 @@ def test_a_provisional_geometry_is_taken_back_by_its_run(cell, runs) -> None:
     with pytest.raises(UsageError, match="left its provisional geometry here"):
         roll_back_config(cell, NAMES[0])
     assert config(cell) == lent.after
-
-
-def test_a_cell_in_use_is_left_alone(cell, runs) -> None:
-    with cell_lock(cell.config_path), pytest.raises(CellBusy):
-        roll_back_config(cell)
-    assert config(cell) == runs[-1].after

@@ -116,13 +116,10 @@ def test_a_deleted_lock_file_lets_no_second_process_in(config: Path) -> None:
         assert not is_busy(config)
 
 
-def test_cells_beside_each_other_are_held_apart(config: Path, tmp_path: Path) -> None:
+def test_cells_beside_each_other_are_held_apart_and_links_to_one_are_the_same(config, tmp_path) -> None:
     (other := tmp_path / "other.toml").write_text("")
     with cell_lock(config):
         assert not is_busy(other)
-
-
-def test_links_and_other_spellings_of_the_path_are_the_same_cell(config: Path, tmp_path: Path) -> None:
     folder = tmp_path / "other"
     folder.mkdir()
     (folder / "linked.toml").symlink_to("../controller.toml")

@@ -16,13 +16,10 @@ from hexacell.storage.toml_document import KeyPath, TomlDocument, locate
 from tests.hexacell.storage.toml_texts import leaves
 
 
-def test_a_missing_place_has_the_line_of_the_table_around_it() -> None:
+def test_a_missing_place_has_the_line_around_it_and_a_byte_order_mark_is_no_text() -> None:
     document = TomlDocument.parse("a = 1\n[b]\nc = 2\n")
     assert document.line_of(("b", "missing", 3)) == 2
     assert document.line_of(("missing",)) is None
-
-
-def test_a_byte_order_mark_is_no_part_of_the_text() -> None:
     assert TomlDocument.parse("\ufeffa = 1").spans == {("a",): slice(5, 6)}
 
 

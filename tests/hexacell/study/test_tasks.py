@@ -60,11 +60,8 @@ def test_tasks_that_a_killed_worker_loses_are_done_again(tmp_path: Path) -> None
     assert dict(found) == {number: number**2 for number in SQUARES}
 
 
-def test_workers_that_always_die_end_the_study() -> None:
+def test_workers_that_always_die_or_a_task_that_raises_end_the_study() -> None:
     with pytest.raises(WorkersLost, match=f"{MOST_LOSSES} sets of workers ended without a result"):
         list(results_of(SQUARES, square, Broken))
-
-
-def test_what_a_task_raises_ends_the_study() -> None:
     with pytest.raises(ValueError, match="0"):
         list(results_of([0], fail, partial(ThreadPoolExecutor, 1)))

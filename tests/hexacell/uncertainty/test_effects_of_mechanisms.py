@@ -1,12 +1,15 @@
-"""Effects are those that a mechanism can have: of rails only with rails, of discs as a sine."""
+"""Effects that depend on the mechanism, rails, discs, its own weight: what they do, and nothing falsely."""
 
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hexacell.cell.loader import load_cell
-from hexacell.identification.placement import Placement
+from hexacell.identification.estimator import identify
+from hexacell.identification.placement import Placement, Weight, leg_forces
 from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.gough_stewart import GoughStewart
@@ -16,12 +19,14 @@ from hexacell.robot.model import robot_of
 from hexacell.uncertainty.effect_kinds import (
     common_sag,
     encoder_eccentricities,
+    own_weight,
     rail_directions,
     rail_waves,
     temperature_at_work,
 )
-from hexacell.uncertainty.effects import Effect
+from hexacell.uncertainty.effects import Effect, Occurrence, errors_by_effects
 from tests.geometries import gough_stewart_geometry
+from tests.hexacell.altered_records import altered
 
 STEP_MM = 1e-4
 CONFIGS = Path(__file__).parents[3] / "configs"
@@ -98,3 +103,42 @@ def test_a_disc_off_centre_errs_by_a_sine_over_the_turn() -> None:
     np.testing.assert_allclose(
         moved.poses.positions - poses.positions, predicted[:, :3], rtol=2e-3, atol=1e-5
     )
+
+
+DOWN = np.array([0.0, 0.0, -1.0])
+CENTRE_MM = np.array([10.0, -5.0, -90.0])
+NEWTON, UM_PER_N = 100.0, 0.08
+"""A compliance at which the records of the paper's robot show it."""
+
+
+@pytest.fixture(scope="module")
+def placement(noisy, make_problem):
+    found = identify(make_problem(noisy))
+    return Placement(found.problem.mechanism, found.geometry, found.poses, found.problem.joints)
+
+
+def test_the_legs_hold_the_weight_in_balance(placement):
+    forces = leg_forces(placement, Weight(DOWN, CENTRE_MM))
+    legs = placement.mechanism.legs(placement.geometry, placement.poses, placement.joints)
+    # A leg that is pulled draws the platform towards its base.
+    pulls = forces[..., None] * legs.directions
+    arms = legs.platform_joints - placement.poses.positions[:, None, :]
+    np.testing.assert_allclose(pulls.sum(axis=1), np.tile(-DOWN, (len(placement), 1)), atol=1e-9)
+    moment = np.cross(placement.poses.rotations @ CENTRE_MM, -DOWN)
+    np.testing.assert_allclose(np.cross(arms, pulls).sum(axis=1), moment, atol=1e-6)
+
+
+def test_a_stated_weight_makes_no_healthy_machine_doubtful(noisy, make_problem, placement):
+    """Without it the residuals are too large, and a person would look for a fault."""
+    forces = NEWTON * leg_forces(placement, Weight(DOWN, CENTRE_MM))
+    moved = np.einsum("nij,nj->ni", placement.by_constraints, 1e-3 * UM_PER_N * forces)[:, :3]
+    rows = {record.id: row for row, record in enumerate(noisy.records)}
+    loaded = altered(noisy, lambda r: {"deviation": np.array(r.deviation) + moved[rows[r.id]]})
+    problem = make_problem(loaded)
+    unstated = identify(problem)
+    assert not unstated.goodness.is_explained
+    for centre in (CENTRE_MM, None):
+        effect = own_weight(NEWTON, UM_PER_N, Weight(DOWN, centre))
+        assert effect.occurrence is Occurrence.CONSTANT
+        stated = identify(replace(problem, systematic=partial(errors_by_effects, (effect,))))
+        assert stated.goodness.is_explained

@@ -17,19 +17,13 @@ def isotropic(sigma: float) -> np.ndarray:
     return effects
 
 
-def test_without_effects_nothing_is_uncertain() -> None:
+def test_without_effects_nothing_is_uncertain_and_one_pose_has_the_quantile_of_its_distribution() -> None:
     stated = errors([[3.0, 4.0, 0.0, 0.0, 0.0, np.radians(2.0)]], np.zeros((1, 6, 0)))
     assert stated.position == LargestError(5.0, 0.0)
     assert stated.orientation.value == pytest.approx(2.0)
-
-
-def test_one_pose_without_estimated_error_has_the_quantile_of_the_chi_distribution() -> None:
     position = errors(np.zeros((1, 6)), isotropic(0.02)).position
     assert position.value == 0.0
     assert position.expanded == pytest.approx(0.02 * np.sqrt(chi2.ppf(0.95, 3)), rel=0.02)
-
-
-def test_one_pose_with_an_estimated_error_has_that_of_the_noncentral_one() -> None:
     stated = errors([[1.0, 2.0, 2.0, 0.0, 0.0, 0.0]], isotropic(0.5)).position
     low, high = (stated.value + sign * stated.expanded for sign in (-1.0, 1.0))
     inside = [ncx2.cdf((edge / 0.5) ** 2, 3, (3.0 / 0.5) ** 2) for edge in (low, high)]

@@ -18,24 +18,18 @@ async def failures(rig, *, unattended: bool = True) -> list[str]:
     return [str(error) for error in await plan_failures(rig.calibration, unattended=unattended)]
 
 
-async def test_every_point_out_of_reach_is_named_with_its_leg(make_rig) -> None:
+async def test_every_point_out_of_reach_or_range_or_next_to_a_singularity_is_named(make_rig) -> None:
     good = (100.0, -100.0, 500.0)
     rig = make_rig(identification__points=(good, FAR, FAR), verification__points=(FAR, good))
-    found = await plan_failures(rig.calibration, unattended=True)
+    far = await plan_failures(rig.calibration, unattended=True)
     names = ["identification point 2", "identification point 3", "verification point 1"]
-    assert [error.subject for error in found] == names
-    assert all(isinstance(error, ReachError) and "leg 1" in str(error) for error in found)
-
-
-async def test_a_point_outside_the_joint_range_is_named_with_its_joint(make_rig) -> None:
+    assert [error.subject for error in far] == names
+    assert all(isinstance(error, ReachError) and "leg 1" in str(error) for error in far)
     found = await failures(make_rig(limits__joint_min=-480.0, limits__joint_max=480.0))
     assert found
     # The controller's config has the other end.
     assert all(re.search("mm, outside (-480 to 200|-200 to 480)", problem) for problem in found)
     assert any(problem.startswith("identification point 1: q") for problem in found)
-
-
-async def test_a_point_next_to_a_singularity_is_named(make_rig) -> None:
     found = await failures(make_rig(limits__singularity_margin=0.5))
     assert len(found) == 4
     assert all("singularity margin is 0.1" in problem and "below 0.5" in problem for problem in found)

@@ -6,33 +6,9 @@ from typing import Any
 
 import pytest
 
-from drivers.errors import (
-    BusError,
-    ConnectionLost,
-    GaugeAtEnd,
-    GaugeSilent,
-    GaugeUnsteady,
-    InvalidSampleError,
-    MotionInterrupted,
-    MoveRefused,
-    PortLost,
-    ResponseTimeout,
-    RestartedNodeError,
-    SilentNodeError,
-    WrongSetting,
-    ZeroVoid,
-)
+from drivers import errors as faults
+from hexacell import errors
 from hexacell.cell.recovery import Action, Escalations, FailureKind
-from hexacell.errors import (
-    AnswerNeeded,
-    DeviceError,
-    FileError,
-    HexacellError,
-    LimitError,
-    SeveralErrors,
-    UsageError,
-    WriteBackUndone,
-)
 from procedures.devices.settling import NeverSettled
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Answer, Pause, Resume
@@ -78,7 +54,7 @@ def jumped_while_away(rig: Any, jump_mm: float) -> Any:
     encoders, shown = rig.bench.encoders, rig.bench.encoders.shown
 
     def unplug() -> None:
-        encoders.failure = BusError("has died", subject="encoder bus")
+        encoders.failure = faults.BusError("has died", subject="encoder bus")
 
     async def back() -> Any:
         encoders.failure = None
@@ -98,7 +74,9 @@ async def test_after_a_lost_encoder_bus_the_reference_is_confirmed_again(rig) ->
 
 
 async def test_an_encoder_that_jumped_while_it_was_away_is_named(rig) -> None:
-    with pytest.raises(HexacellError, match=r"encoder 3: shows slider 3 at .* See whether it slipped"):
+    with pytest.raises(
+        errors.HexacellError, match=r"encoder 3: shows slider 3 at .* See whether it slipped"
+    ):
         await rig.run(jumped_while_away(rig, 3.0), policy=UNATTENDED)
     assert "P2" not in [str(event.at) for event in happened(rig, events.ReferenceConfirmed)]
 
@@ -114,19 +92,19 @@ async def test_a_small_jump_while_it_was_away_costs_the_set(rig) -> None:
 
 async def test_a_device_that_cannot_be_reopened_ends_the_run(rig) -> None:
     encoders = rig.bench.encoders
-    encoders_lost = BusError("has died", subject="encoder bus")
+    encoders_lost = faults.BusError("has died", subject="encoder bus")
 
     def unplug() -> None:
         encoders.failure = encoders.dead = encoders_lost
 
-    with pytest.raises(BusError):
+    with pytest.raises(faults.BusError):
         await rig.run(failing(KEY, unplug), policy=UNATTENDED)
     assert len(happened(rig, events.Failed)) == 3
 
 
 async def test_a_void_zero_invalidates_the_set(rig) -> None:
     gauge = rig.gauges[0]
-    void = ZeroVoid("was off in between", subject="gauge x")
+    void = faults.ZeroVoid("was off in between", subject="gauge x")
 
     def switch_off() -> None:
         gauge.void = void
@@ -145,9 +123,9 @@ async def test_a_robot_that_cannot_be_stopped_ends_the_run_without_recovery(rig)
 
     def break_down() -> None:
         rig.gauges[1].failures.append(SILENT)
-        rig.controller.failures["stop"] = DeviceError("could not be stopped", subject="controller")
+        rig.controller.failures["stop"] = errors.DeviceError("could not be stopped", subject="controller")
 
-    with pytest.raises(GaugeSilent):
+    with pytest.raises(faults.GaugeSilent):
         await rig.run(failing(KEY, break_down), policy=UNATTENDED)
     assert not happened(rig, events.Failed)
 
@@ -192,40 +170,40 @@ P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 STEP = Sample(at=P1, orientation=2, pose=(0.0,) * 6)
 
 
-class TrippedGuard(DeviceError):
+class TrippedGuard(errors.DeviceError):
     """As another part of the program may define it."""
 
 
 @pytest.mark.parametrize(
     ("error", "kind"),
     [
-        (GaugeSilent("does not answer"), FailureKind.GAUGE_SILENT),
-        (GaugeUnsteady("swings"), FailureKind.UNSETTLED),
+        (faults.GaugeSilent("does not answer"), FailureKind.GAUGE_SILENT),
+        (faults.GaugeUnsteady("swings"), FailureKind.UNSETTLED),
         (NeverSettled("moves"), FailureKind.UNSETTLED),
-        (GaugeAtEnd("at its end"), FailureKind.GAUGE_AT_END),
+        (faults.GaugeAtEnd("at its end"), FailureKind.GAUGE_AT_END),
         (TravelError("at its end"), FailureKind.GAUGE_AT_END),
-        (WrongSetting("inch"), FailureKind.GAUGE_SETTING),
-        (ZeroVoid("was off"), FailureKind.ZERO_VOID),
-        (SilentNodeError("silent"), FailureKind.ENCODER_SILENT),
-        (InvalidSampleError("no magnet"), FailureKind.ENCODER_ALARM),
-        (RestartedNodeError("booted"), FailureKind.ENCODER_RESTARTED),
-        (BusError("died"), FailureKind.LINK_LOST),
-        (PortLost("port /dev/x was lost"), FailureKind.LINK_LOST),
-        (ConnectionLost("gone"), FailureKind.LINK_LOST),
-        (ResponseTimeout("late"), FailureKind.LINK_LOST),
-        (MoveRefused("to move", "limits", subject="controller"), FailureKind.CONTROLLER),
-        (MotionInterrupted("stopped elsewhere"), FailureKind.CONTROLLER),
+        (faults.WrongSetting("inch"), FailureKind.GAUGE_SETTING),
+        (faults.ZeroVoid("was off"), FailureKind.ZERO_VOID),
+        (faults.SilentNodeError("silent"), FailureKind.ENCODER_SILENT),
+        (faults.InvalidSampleError("no magnet"), FailureKind.ENCODER_ALARM),
+        (faults.RestartedNodeError("booted"), FailureKind.ENCODER_RESTARTED),
+        (faults.BusError("died"), FailureKind.LINK_LOST),
+        (faults.PortLost("port /dev/x was lost"), FailureKind.LINK_LOST),
+        (faults.ConnectionLost("gone"), FailureKind.LINK_LOST),
+        (faults.ResponseTimeout("late"), FailureKind.LINK_LOST),
+        (faults.MoveRefused("to move", "limits", subject="controller"), FailureKind.CONTROLLER),
+        (faults.MotionInterrupted("stopped elsewhere"), FailureKind.CONTROLLER),
         (DriftTripped(Trip(Guard.DRIFT, "P1", "drifted", "Resume")), FailureKind.DRIFT),
         (NoSafePath("no way"), FailureKind.NO_WAY),
-        (FileError("disk full"), FailureKind.FILE),
+        (errors.FileError("disk full"), FailureKind.FILE),
         (TrippedGuard("following error"), FailureKind.OTHER),
-        (LimitError("declined"), FailureKind.FINAL),
-        (AnswerNeeded("nobody"), FailureKind.FINAL),
-        (WriteBackUndone("undone"), FailureKind.FINAL),
-        (UsageError("unknown"), FailureKind.FINAL),
+        (errors.LimitError("declined"), FailureKind.FINAL),
+        (errors.AnswerNeeded("nobody"), FailureKind.FINAL),
+        (errors.WriteBackUndone("undone"), FailureKind.FINAL),
+        (errors.UsageError("unknown"), FailureKind.FINAL),
     ],
 )
-def test_the_class_of_an_error_decides_its_kind(error: HexacellError, kind: FailureKind) -> None:
+def test_the_class_of_an_error_decides_its_kind(error: errors.HexacellError, kind: FailureKind) -> None:
     assert kind_of(error) is kind
 
 
@@ -243,7 +221,7 @@ def test_only_an_attended_run_asks_and_it_always_does() -> None:
 
 
 def test_attempts_are_counted_by_kind_and_set_since_the_last_interruption() -> None:
-    silent, drift = GaugeSilent("silent"), DriftTripped(Trip(Guard.DRIFT, "P1", "drifted", "Resume"))
+    silent, drift = faults.GaugeSilent("silent"), DriftTripped(Trip(Guard.DRIFT, "P1", "drifted", "Resume"))
     told: list[events.Event] = []
     for error in (silent, silent, drift, silent, silent):
         told.append(failed(UNATTENDED, error, STEP, fold(told)))
@@ -254,6 +232,6 @@ def test_attempts_are_counted_by_kind_and_set_since_the_last_interruption() -> N
 
 
 def test_the_most_serious_of_several_failures_determines_the_action() -> None:
-    several = SeveralErrors("two", [GaugeSilent("silent"), WrongSetting("inch")])
+    several = errors.SeveralErrors("two", [faults.GaugeSilent("silent"), faults.WrongSetting("inch")])
     failure = failed(UNATTENDED, several, STEP, RunState())
     assert (failure.failure, failure.action) == (FailureKind.GAUGE_SETTING, Action.ABORT)

@@ -114,16 +114,13 @@ async def test_it_is_not_reset_on_resuming_either(startup, needed) -> None:
     assert bench.controller.log == ["prepare"]
 
 
-async def test_a_preparation_that_failed_may_have_reset_it(startup) -> None:
+async def test_a_preparation_that_failed_may_have_reset_it_and_one_that_a_guard_prevented_not(startup):
     starting, bench = startup(EVERYTHING, UnattendedOperator(), COLD)
     bench.controller.failures["prepare"] = DeviceError("does not switch on", subject="controller")
     with pytest.raises(DeviceError, match="does not switch on"):
         await starting.prepare(NEW)
     with pytest.raises(AnswerNeeded, match="reset it at the controller"):
         await starting.prepare(NEW)
-
-
-async def test_a_preparation_that_a_guard_prevented_reset_nothing(startup) -> None:
     starting, bench = startup(EVERYTHING, UnattendedOperator(), COLD)
     bench.encoders.failure = DeviceError("has an alarm", subject="encoder 3")
     with pytest.raises(GuardTripped, match="has an alarm"):
@@ -133,15 +130,12 @@ async def test_a_preparation_that_a_guard_prevented_reset_nothing(startup) -> No
     assert bench.controller.log == ["prepare", *DONE]
 
 
-async def test_a_controller_that_the_reload_restarted_is_made_ready_by_the_cell_files_word(startup) -> None:
+async def test_after_a_reload_the_cell_files_word_counts_but_not_for_an_emergency_stop(startup) -> None:
     starting, bench = startup(EVERYTHING, UnattendedOperator(), [])
     await starting.prepare(NEW)
     bench.controller.needed = list(COLD)
     await starting.reload()
     assert bench.controller.log == ["prepare", "reload", *DONE]
-
-
-async def test_an_emergency_stop_during_a_reload_is_a_persons(startup) -> None:
     starting, bench = startup(EVERYTHING, UnattendedOperator(), [StartupAction.RESET_ESTOP])
     with pytest.raises(AnswerNeeded, match="reset it at the controller"):
         await starting.reload()

@@ -55,7 +55,7 @@ async def zeroed(station: Station) -> RunState:
     return fold([await station.do(SAMPLE)])
 
 
-async def test_the_first_record_of_a_set_is_the_zero_of_the_others(station: Station) -> None:
+async def test_the_first_record_of_a_set_is_the_zero_and_the_raw_answers_are_kept_in_their_order(station):
     station.shown[:] = [-1.0, 2.0, 3.0]
     event = await station.do(SAMPLE)
     assert isinstance(event, events.RecordTaken)
@@ -66,9 +66,6 @@ async def test_the_first_record_of_a_set_is_the_zero_of_the_others(station: Stat
     event = await station.do(SECOND, fold([event]))
     assert event.deviation_mm == (0.5, -0.25, 0.0)
     assert event.reading.gauges_mm == (-0.5, 1.75, 3.0)
-
-
-async def test_the_raw_answers_are_kept_in_the_order_taken(station: Station) -> None:
     station.shown[:] = [-1.0, 2.0, 3.0]
     reading = (await station.do(SAMPLE)).reading
     assert set(reading.answers) == {("-1.000", "+2.000", "+3.000")}

@@ -92,15 +92,12 @@ def test_a_lost_line_end_before_the_last_line_loses_no_record(path: Path, writte
         read_journal(path)
 
 
-def test_a_line_without_end_does_not_fill_the_memory(path: Path, written: bytes) -> None:
+def test_a_line_without_end_fills_no_memory_and_opening_a_damaged_journal_changes_nothing(path, written):
     path.write_bytes(written + b"x" * 1000)
     assert read_journal(path, longest_line=2000) == TOLD
     path.write_bytes(written + b"x" * 5000)
     with pytest.raises(FileError, match=r":5: .*damaged"):
         read_journal(path, longest_line=2000)
-
-
-def test_opening_a_damaged_journal_does_not_change_it(path: Path, written: bytes) -> None:
     damaged = written.replace(b"a tester", b"a taster")
     path.write_bytes(damaged)
     with pytest.raises(FileError, match=r":2: .*damaged"):

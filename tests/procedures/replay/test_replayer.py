@@ -211,15 +211,12 @@ def test_a_reading_that_had_not_settled_is_reported(recording, replay, changes: 
     assert "had not settled" in str(first)
 
 
-def test_one_manipulated_event_gives_one_difference(recording, replay) -> None:
+def test_one_manipulated_event_or_an_early_end_gives_one_difference(recording, replay) -> None:
     whole = recording.until(events.SetClosed)
     last = sum(isinstance(event, events.Arrived) for event in whole)  # no later move begins there
     history = altered(whole, events.Arrived, {"pose": (100.0, -100.0, 500.0, 1.0, 0.0, 0.0)}, last)
     [line] = (n for n, event in enumerate(history, 1) if event != recording.history[n - 1])
     assert {difference.line for difference in replay(history, scope=Scope.RESULTS).differences} == {line}
-
-
-def test_a_run_that_ended_too_early_is_reported(recording, replay) -> None:
     early = [*recording.until(events.SetClosed), recording.history[-1]]
     [difference] = replay(early).differences
     assert difference.aspect is Aspect.DECISION

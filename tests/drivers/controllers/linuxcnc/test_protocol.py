@@ -97,16 +97,13 @@ def test_an_answer_is_matched_to_its_command(line, command, answer):
     assert protocol.parse_response(line, command) == answer
 
 
-def test_explanations_are_distinguished_from_answers():
+def test_explanations_are_no_answers_and_further_positions_of_other_axes() -> None:
     assert (
         protocol.parse_explanation("error: Machine must be 'ON' for SET MDI")
         == "Machine must be 'ON' for SET MDI"
     )
     assert protocol.parse_explanation("ERROR OK") == ""
     assert protocol.parse_explanation("warning: newer") == ""
-
-
-def test_positions_beyond_the_sixth_belong_to_other_axes():
     assert protocol.parse_positions("1 -2 3.5 4 5 6 7 8") == (1.0, -2.0, 3.5, 4.0, 5.0, 6.0)
 
 

@@ -28,19 +28,16 @@ async def test_opening_greets_takes_control_and_orders_nothing_else(play):
     assert identity == DeviceIdentity(name, "linuxcncrsh", "EMCNETSVR 1.1, machine.ini")
 
 
-async def test_opening_a_server_of_version_2_10(play):
+async def test_servers_of_other_versions_are_opened(play) -> None:
     newer = b"warning: Requested version '1.0' is newer than '0.9'\r\nHELLO ACK EMCNETSVR 0.9\r\n"
     unknown = ("set set_wait done", b"error: Subcommand not found: SET set_wait\r\nSET NAK\r\n")
     then = said("get enable: ON | get error: OK | set wait_mode done | get inifile: /a/b.ini")
     driver = await play.driver([(HELLO, newer), *play.GREETING[1:], unknown, *then])
     assert (await driver.open()).description == "EMCNETSVR 0.9, b.ini"
-
-
-async def test_a_server_without_echo_and_with_the_alias(play):
     greeting = [(HELLO, b"\r\n\r\nHELLO ACK EMCNETSVR 1.1\n\r"), ("set echo off", play.SILENCE)]
     alias = [*play.GREETING[2:], ("set set_wait done", b"SET WAIT_MODE ACK\r\n")]
-    unknown = [("get inifile", b"GET INIFILE NAK\r\n\r\n")] * 2
-    driver = await play.driver([*greeting, *alias, *unknown])
+    no_file = [("get inifile", b"GET INIFILE NAK\r\n\r\n")] * 2
+    driver = await play.driver([*greeting, *alias, *no_file])
     assert (await driver.open()).description == "EMCNETSVR 1.1"
 
 
@@ -100,14 +97,11 @@ async def test_opening_times_out_if_the_host_does_not_accept_the_connection(monk
         await driver.open()
 
 
-async def test_a_server_that_never_answers_the_greeting_is_reported(play):
+async def test_an_opening_that_fails_is_told_leaves_it_closed_and_can_be_repeated(play) -> None:
     play.patience = play.IMPATIENT
     driver = await play.driver([(HELLO, play.SILENCE)])
     with pytest.raises(ResponseTimeout, match="accepts the connection but does not respond"):
         await driver.open()
-
-
-async def test_a_failed_opening_can_be_repeated_and_leaves_it_closed(play):
     driver = await play.driver([(HELLO, play.HANG_UP)], play.OPENING)
     with pytest.raises(ConnectionLost, match=r"takes no more clients .*without --sessions"):
         await driver.open()

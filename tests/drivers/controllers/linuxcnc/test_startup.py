@@ -33,21 +33,15 @@ UNTIL_HOMED = [*TAKING_CONTROL, *SWITCHING_ON]
 UNTIL_MDI = [*UNTIL_HOMED, *READY, *MDI_MODE]
 
 
-async def test_prepare_releases_the_emergency_stop_switches_on_and_homes(play):
+async def test_prepare_leads_from_emergency_stop_and_teleoperation_to_mdi_and_waits_for_each(play) -> None:
     until_homed = [*TAKING_CONTROL, *RESETTING, *SWITCHING_ON, *ON_NOT_HOMED, *OWN_COORDINATES]
     homed = [*IN_JOINT_MODE, *HOMING, *READY, *MDI_MODE, *OWN_COORDINATES]
     driver = await play.opened([*until_homed, *homed])
     await driver.prepare(ALL)
-
-
-async def test_homing_leaves_teleoperation_first(play):
     leaving = said("set mode manual | get teleop_enable: YES | set teleop_enable off | get error: OK")
     homed = [*leaving, *HOMING, *READY, *MDI_MODE, *OWN_COORDINATES]
     driver = await play.opened([*UNTIL_HOMED, *ON_NOT_HOMED, *OWN_COORDINATES, *homed])
     await driver.prepare(ALL)
-
-
-async def test_prepare_waits_until_each_state_is_reached(play):
     reset = [*TAKING_CONTROL, *RESETTING[:-1], *IN_ESTOP, *NO_ESTOP, *SWITCHING_ON[:-1], OFF[-1], *IS_ON]
     mode = said("set mode mdi | get mode: MANUAL | get mode: MDI")
     driver = await play.opened([*reset, *READY, *mode, *OWN_COORDINATES])
@@ -164,7 +158,7 @@ async def test_a_check_finds_them_and_sets_nothing(play, conversation, problem):
         await driver.check()
 
 
-async def test_a_refusal_quotes_the_controllers_error_messages(play):
+async def test_a_refusal_quotes_the_controllers_error_messages_also_without_a_nak(play) -> None:
     refused = said("set machine on: NAK | get enable: ON")
     errors = [("get error", f"ERROR drive {n} is cold\r\n".encode()) for n in (1, 2, 3, 4, 5, 5)]
     driver = await play.opened([*TAKING_CONTROL, *OFF, *refused, *errors, NO_ERROR])
@@ -172,12 +166,9 @@ async def test_a_refusal_quotes_the_controllers_error_messages(play):
         await driver.prepare(ALL)
     four = "drive 1 is cold; drive 2 is cold; drive 3 is cold; drive 4 is cold"
     assert caught.value.problem == f"refuses 'set machine on': {four}; and 1 more"
-
-
-async def test_a_refusal_of_2_10_without_a_nak(play):
-    refused = b"error: Cannot issue SET MODE command while SET MDI command is still active\r\n"
+    without_nak = b"error: Cannot issue SET MODE command while SET MDI command is still active\r\n"
     why = said("get enable: ON | get error: OK")
-    driver = await play.opened([*UNTIL_MDI[:-2], ("set mode mdi", refused), *why])
+    driver = await play.opened([*UNTIL_MDI[:-2], ("set mode mdi", without_nak), *why])
     with pytest.raises(CommandRefused, match="while SET MDI command is still active"):
         await driver.prepare(ALL)
 

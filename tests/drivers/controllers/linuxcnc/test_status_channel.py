@@ -111,14 +111,11 @@ async def test_the_status_is_read_during_a_move(play) -> None:
     await moving
 
 
-async def test_stopping_uses_the_status_connection(play) -> None:
+async def test_stopping_uses_the_status_connection_unless_it_does_not_answer(play) -> None:
     driver = await play.opened([], [*LOOKING_ON, *asked(), wire.AGAIN_IN_CONTROL, *play.STOPPED])
     await driver.status()
     await driver.stop()
     assert play.servers[0].connections == 2, "no time is lost on opening a third one"
-
-
-async def test_stopping_works_if_the_status_connection_does_not_answer(play) -> None:
     driver = await play.opened(
         [], [*LOOKING_ON, *asked(), ("set enable EMCTOO", play.SILENCE)], play.STOPPING
     )

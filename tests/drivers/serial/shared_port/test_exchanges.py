@@ -186,20 +186,14 @@ plain = st.binary(max_size=20).filter(lambda data: not set(data) & set(LINE_ENDS
 ends = st.sampled_from([b"", b"\r", b"\n", b"\r\n", b"\0", b"\0\0\r\n"])
 
 
-def test_no_frame_until_it_is_complete():
+def test_no_frame_until_it_is_complete_and_the_echo_of_the_request_is_none() -> None:
     assert cut_frame(b"", b"?\r", b"\r") is None
     assert cut_frame(b"+1.23", b"?\r", b"\r") is None
     assert cut_frame(b"?", b"?\r", b"\r") is None
-
-
-def test_the_echo_of_the_request_is_no_answer():
     assert cut_frame(b"?\r", b"?\r", b"\r") is None
     assert cut_frame(b"?\r+1.234\r", b"?\r", b"\r") == (b"+1.234\r", b"")
     assert cut_frame(b"R\r\n+1, MM\r\n", b"R\r", b"\r\n") == (b"+1, MM\r\n", b"")
     assert cut_frame(b"M0\rM0,+001.0000\r\n", b"M0\r\n", b"\r") == (b"M0,+001.0000\r", b"\n")
-
-
-def test_an_answer_that_begins_like_the_request_is_none_of_its_echo():
     assert cut_frame(b"911\r", b"9\r", b"\r") == (b"911\r", b"")
     assert cut_frame(b"M0,+001.0000\r\n", b"M0\r\n", b"\r") == (b"M0,+001.0000\r", b"\n")
 

@@ -193,15 +193,12 @@ def test_the_displacement_does_not_depend_on_the_frames_of_teaching(paper, calib
     np.testing.assert_allclose(elsewhere.frames.base, WORKSHOP.base, atol=1e-12)
 
 
-def test_poses_out_of_reach_do_not_count(paper, calibrated):
+def test_poses_out_of_reach_do_not_count_and_without_any_the_frames_stay(paper, calibrated) -> None:
     far = Pose(0.0, 900.0, 550.0)
     some = choose(paper, [TASK[0], far, *TASK[1:]])
     assert some.found.tolist() == [True, False, True, True, True]
     np.testing.assert_allclose(some.geometry.vector, calibrated.geometry.vector, atol=1e-9)
     assert len(some.displacement.distances_mm) == 4
-
-
-def test_without_a_pose_the_frames_stay_as_the_convention_has_them(paper):
     for poses in ([], [Pose(0.0, 900.0, 550.0)]):
         nothing = choose(paper, poses)
         np.testing.assert_array_equal(nothing.geometry.vector, paper.actual.vector)

@@ -112,15 +112,12 @@ def test_records_that_cannot_be_used_do_not_count(visit, make_problem, spoil):
         identify(make_problem(measured))
 
 
-def test_joints_of_other_poses_are_refused_and_the_first_record_named(visit, make_problem):
+def test_joints_or_a_drawing_of_another_machine_are_refused(visit, make_problem, paper) -> None:
     """For instance with the sign of the encoders reversed."""
     measured = visit(seed=2).measured()
     reversed_encoders = altered(measured, lambda r: {"joints": np.negative(r.joints)})
     with pytest.raises(IdentifiabilityError, match=r"\d+ of 55 records .* first is point 1, orientation 1"):
         make_problem(reversed_encoders)
-
-
-def test_a_drawing_of_another_machine_is_refused(paper, visit, make_problem):
     other = hexaglide_geometry(paper.nominal["S"], paper.nominal["B"], paper.nominal["l"] - 150.0)
     with pytest.raises(IdentifiabilityError, match="joint variables do not belong to the commanded pose"):
         make_problem(visit(seed=2).measured(), drawing=other, controller=other)

@@ -65,13 +65,10 @@ def test_another_noise_than_stated_is_reported_with_its_factor(
     assert words.format(tested.ratio) in residual_sentence(tested)
 
 
-def test_a_percent_too_much_noise_is_no_disagreement_however_certain():
+def test_a_percent_too_much_noise_is_no_disagreement_and_no_spare_records_prove_nothing() -> None:
     tested = ChiSquareTest(chi2=1.02e6, expected=1e6)
     assert tested.probability < 1e-20
     assert tested.agreement is ChiSquareVerdict.AGREES
-
-
-def test_without_more_records_than_unknowns_nothing_is_proven():
     tested = ChiSquareTest(chi2=0.0, expected=1e-9)
     assert tested.agreement is ChiSquareVerdict.NOT_EVALUATED
     assert "prove nothing" in residual_sentence(tested)

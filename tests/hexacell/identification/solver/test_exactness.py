@@ -50,15 +50,12 @@ def test_other_robots_within_the_tolerances(hexaglide, paper, visit, make_proble
     assert_exact(found, true, records=55)
 
 
-def test_the_real_robot_whose_ball_was_30_mm_away(paper, visit, make_problem):
+def test_robots_far_from_the_drawing_and_as_drawn(paper, visit, make_problem) -> None:
     problem = make_problem(
         visit(paper.calibrated, seed=1).measured(),
         tolerances=Tolerances({"S": 7.0, "B": 7.0, "l": 7.0}, ball_mm=40.0),
     )
     assert_exact(identify(problem), paper.calibrated, records=55)
-
-
-def test_a_robot_that_is_as_drawn(paper, visit, make_problem):
     assert_exact(identify(make_problem(visit(paper.nominal).measured())), paper.nominal, records=55)
 
 

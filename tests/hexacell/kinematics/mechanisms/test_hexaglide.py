@@ -90,14 +90,11 @@ def test_rail_1_and_slider_3_are_the_base_frame() -> None:
     assert normal["S"][2, 1] == 0.0 < normal["S"][2, 0]
 
 
-def test_rails_that_count_the_opposite_way_are_refused() -> None:
+def test_rails_the_opposite_way_and_sliders_on_one_rail_fix_no_frame() -> None:
     numbers = machine()
     numbers["rail"][4] = turns_of(-directions_of_rails(numbers["rail"][0])[0])
     with pytest.raises(UsageError, match="a slider counts the opposite way of slider 1"):
         MECHANISM.normalize_frames(six_rails_geometry(**numbers))
-
-
-def test_sliders_on_one_rail_fix_no_frame() -> None:
     numbers = machine()
     numbers["S"][2] = numbers["S"][0] + 100.0 * directions_of_rails(numbers["rail"][0])[0]
     with pytest.raises(UsageError, match="two slider joints that fix the frame are on one rail"):

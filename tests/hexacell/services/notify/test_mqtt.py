@@ -42,13 +42,10 @@ def test_login_and_tls(tmp_path) -> None:
     assert len(server.published) == 1
 
 
-def test_a_wrong_password_is_told_and_not_shown() -> None:
+def test_a_wrong_password_or_no_acknowledgement_is_told_and_nothing_shown() -> None:
     with broker(login=LOGIN) as server, pytest.raises(NoticeUndelivered, match="refuses") as raised:
         deliver(at(server.port, user="robot", password="hidden-mistake"), a_notice())
     assert "hidden" not in str(raised.value)
     assert server.published == []
-
-
-def test_what_is_not_acknowledged_is_not_told() -> None:
     with broker(acknowledges=False) as server, pytest.raises(NoticeUndelivered, match=r"acknowledge|taken"):
         deliver(at(server.port), a_notice(), longest_s=0.5)

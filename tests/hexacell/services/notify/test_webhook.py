@@ -43,7 +43,7 @@ def test_a_refusal_is_tried_again_after_pauses_that_grow(monkeypatch) -> None:
     assert len(server.bodies) == 3
 
 
-def test_a_refusal_is_told() -> None:
+def test_a_refusal_is_told_and_a_password_does_not_follow_a_redirection() -> None:
     with webhook() as server:
         for status in (401, 404, 500):
             server.statuses = [status]
@@ -51,9 +51,6 @@ def test_a_refusal_is_told() -> None:
                 deliver(an_address(server.url, token="hidden-token"), NOTICE)
             assert "hidden" not in str(raised.value)
         assert server.headers[0]["Authorization"] == "Bearer hidden-token"
-
-
-def test_a_password_does_not_follow_a_redirection() -> None:
     with webhook() as other, webhook() as server:
         server.statuses, server.location = [307], other.url
         with pytest.raises(NoticeUndelivered, match="answers 307"):
@@ -61,14 +58,11 @@ def test_a_password_does_not_follow_a_redirection() -> None:
     assert other.bodies == []
 
 
-def test_where_nobody_listens() -> None:
+def test_where_nobody_listens_or_answers_is_told_in_time() -> None:
     url = f"http://127.0.0.1:{closed_port()}/secret-path-7"
     with pytest.raises(NoticeUndelivered, match="refused") as raised:
         deliver(an_address(url, open_url=None), NOTICE)
     assert "secret-path-7" not in str(raised.value)
-
-
-def test_who_never_answers_is_waited_for_only_so_long() -> None:
     with silent_server() as port, pytest.raises(NoticeUndelivered, match=r"not (answer|taken)"):
         deliver(an_address(f"http://127.0.0.1:{port}/"), NOTICE, longest_s=0.2)
 

@@ -22,26 +22,20 @@ def quiet(*spans: str, **changes: object) -> UnattendedSettings:
     return UnattendedSettings.model_validate({"quiet_hours": spans, **changes})
 
 
-def test_a_span_may_go_past_midnight() -> None:
+def test_a_span_may_go_past_midnight_and_one_that_follows_at_once_goes_on() -> None:
     nights = quiet("22:00-06:00")
     assert quiet_until(nights, at("23:30")) == at("06:00", 1)
     assert quiet_until(nights, at("05:59")) == at("06:00")
     assert quiet_until(nights, at("06:00")) is None
-
-
-def test_one_that_follows_at_once_goes_on() -> None:
     assert quiet_until(quiet("06:00-14:00", "14:00-22:00"), at("07:00")) == at("22:00")
 
 
-def test_days_are_those_on_which_they_begin() -> None:
+def test_days_are_those_on_which_they_begin_and_without_quiet_hours_there_are_none() -> None:
     friday = quiet("22:00-06:00", quiet_days=("fri",))
     assert quiet_until(friday, at("23:00")) is None
     assert quiet_until(friday, at("23:00", 4)) == at("06:00", 5)
     assert quiet_until(friday, at("05:00", 5)) == at("06:00", 5)
     assert next_quiet(friday, at("12:00")) == at("22:00", 4)
-
-
-def test_without_quiet_hours_there_are_none() -> None:
     assert quiet_until(quiet(), MONDAY) is None
     assert next_quiet(quiet(), MONDAY) is None
     assert next_quiet(quiet("05:30-22:00", quiet_days=()), MONDAY) is None

@@ -166,9 +166,8 @@ class Devices:
 
     async def close(self) -> None:
         """Let all of them go, whatever happens to one."""
-        ports: list[
-            interfaces.Gauge | interfaces.EncoderBank | interfaces.Controller | interfaces.StopInput
-        ] = [*(mounted.gauge for mounted in self.gauges), self.encoders, self.controller, self.stop_input]
+        gauges: list[interfaces.Device[Any]] = [mounted.gauge for mounted in self.gauges]
+        ports = [*gauges, self.encoders, self.controller, self.stop_input]
         await asyncio.gather(*(port.close() for port in ports), return_exceptions=True)
 
 

@@ -1,7 +1,9 @@
 """Settled readings: readings are taken until a whole window of them agrees."""
 
 from collections import deque
+from collections.abc import Awaitable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -71,22 +73,19 @@ def trimmed_mean(readings: Array) -> Array:
 async def read_all(devices: Devices, clock: CellClock) -> DeviceSnapshot:
     """Read everything once: the gauges and a round of the encoders at the same time."""
     answered_s: list[float] = []
-    gauges: list[GaugeReading] = []
-    encoders: list[EncoderSample] = []
 
     def note_answer() -> None:
         answered_s.append(clock.now())
 
-    async def read_gauges() -> None:
-        gauges.extend(await devices.read_gauges(note_answer))
-
-    async def read_encoders() -> None:
-        encoders.append(await devices.read_encoders())
+    async def read_encoders() -> EncoderSample:
+        sample = await devices.read_encoders()
         note_answer()
+        return sample
 
-    await gather_errors("devices cannot be read", [read_gauges(), read_encoders()])
+    calls: list[Awaitable[Any]] = [devices.read_gauges(note_answer), read_encoders()]
+    gauges, encoders = await gather_errors("devices cannot be read", calls)
     last_s = max(answered_s)
-    return DeviceSnapshot(last_s, tuple(gauges), encoders[0], last_s - min(answered_s))
+    return DeviceSnapshot(last_s, tuple(gauges), encoders, last_s - min(answered_s))
 
 
 async def settle(devices: Devices, timing: TimingSettings, clock: CellClock) -> Settled:

@@ -20,7 +20,7 @@ status connection (one status query at a time), the two locks of the arbiter.
 import asyncio
 import logging
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager, nullcontext
+from contextlib import asynccontextmanager, nullcontext, suppress
 from dataclasses import replace
 from enum import Enum, auto
 
@@ -229,17 +229,13 @@ class Session:
 
     async def _released_status_connection(self) -> Connection | None:
         """Give the status connection away for a stop; None if a query occupies it for too long."""
-        try:
-            async with asyncio.timeout(_RELEASE_TIMEOUT_S):
-                await self._query.acquire()
-        except TimeoutError:
-            return None
-        commands, self._querying.commands = self._querying.commands, None
-        self._query.release()
-        if commands is None:
-            return None
-        commands.connection.send_turn = nullcontext
-        return commands.connection
+        with suppress(TimeoutError):
+            async with asyncio.timeout(_RELEASE_TIMEOUT_S), self._query:
+                commands, self._querying.commands = self._querying.commands, None
+                if commands is not None:
+                    commands.connection.send_turn = nullcontext
+                    return commands.connection
+        return None
 
     async def _stopped_over(self, ready: Connection, tolerance_mm: float) -> bool:
         try:

@@ -189,7 +189,7 @@ def cost(found: Identification) -> float:
 def _is_plausible(problem: Problem, found: Identification) -> bool:
     """Whether an estimate is of all records of the problem, with residuals as the noise explains them."""
     is_small = cost(found) <= IMPLAUSIBLE_COST * found.problem.coordinates + FEW_RESIDUALS
-    return found.converged and found.records == problem.records and is_small
+    return found.termination.converged and found.records == problem.records and is_small
 
 
 def _search(problem: Problem, found: Identification) -> ChainedEstimate:
@@ -234,7 +234,7 @@ def _from_other_starts(problem: Problem, found: Identification) -> Identificatio
         elif is_better:
             same = 0
         best = other if is_better else best
-    return best if best.converged else _continued(problem, best)
+    return best if best.termination.converged else _continued(problem, best)
 
 
 def _estimates_from_other_starts(problem: Problem) -> Iterator[Identification]:

@@ -174,13 +174,12 @@ class Check:
         return self._stated[records]
 
     def final_statement(
-        self, measurements: MeasurementSet, effects: tuple[Effect, ...] | None = None
+        self, measurements: MeasurementSet, effects: tuple[Effect, ...]
     ) -> CheckStatement | None:
         """The statement at the end of the check, where what is not decided is not evaluated.
 
-        ``effects`` are the systematic ones as they are known by then, if not as before.
+        ``effects`` are the systematic ones as they are known by then.
         """
-        effects = self.effects if effects is None else effects
         stated = self._statement(measurements, effects)
         if stated is None or stated.is_decided:
             return stated

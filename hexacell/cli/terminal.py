@@ -8,6 +8,7 @@ import signal
 import sys
 import termios
 from collections.abc import Callable, Coroutine, Iterable, Mapping
+from dataclasses import dataclass
 from io import TextIOWrapper
 from types import FrameType
 from typing import Any, TextIO, TypeVar
@@ -94,24 +95,18 @@ class SignalCommands:
                 self._console.print("Stopping after this step; Ctrl-C again stops motion at once.")
 
 
+@dataclass(eq=False)
 class KeyboardCommands:
     """Turns letters that are typed into commands; listens to the engine to know which set they refer to.
 
     ``put`` takes the commands. ``answers`` are further letters, each with what prints an answer.
     """
 
-    def __init__(
-        self,
-        console: Console,
-        put: Callable[[Command], None],
-        terminal: TextIO,
-        answers: Mapping[str, Callable[[], None]],
-    ) -> None:
-        self._console = console
-        self._put = put
-        self._terminal = terminal
-        self._answers = answers
-        self._at: SetKey | None = None
+    console: Console
+    put: Callable[[Command], None]
+    terminal: TextIO
+    answers: Mapping[str, Callable[[], None]]
+    _at: SetKey | None = None
 
     def __call__(self, event: events.Event, _: RunState) -> None:
         """Keep the set that is being measured."""
@@ -124,29 +119,29 @@ class KeyboardCommands:
         try:
             return await work
         finally:
-            asyncio.get_running_loop().remove_reader(self._terminal)
+            asyncio.get_running_loop().remove_reader(self.terminal)
 
     def listen(self) -> None:
         """Read what is typed from now on, until another reader of the terminal is installed."""
-        asyncio.get_running_loop().add_reader(self._terminal, self._read)
+        asyncio.get_running_loop().add_reader(self.terminal, self._read)
 
     def _read(self) -> None:
-        line = self._terminal.readline()
+        line = self.terminal.readline()
         if not line:  # end of input, which would be reported again and again
-            asyncio.get_running_loop().remove_reader(self._terminal)
+            asyncio.get_running_loop().remove_reader(self.terminal)
             return
         self.take(line)
 
     def take(self, line: str) -> None:
         """Put the command that a line means into the queue; explain the letters where it means none."""
         word, _, number = line.strip().partition(" ")
-        answer, make = self._answers.get(word), self._commands(number).get(word)
+        answer, make = self.answers.get(word), self._commands(number).get(word)
         if answer is not None:
             answer()
         elif make is not None:
-            self._put(make())
+            self.put(make())
         elif word:
-            self._console.print(LETTERS)
+            self.console.print(LETTERS)
 
     def _commands(self, number: str) -> dict[str, Callable[[], Command]]:
         """The commands by their letters; a number is that of a record of this point."""

@@ -225,12 +225,6 @@ class Receipt(JsonRecord):
             first, *further = moved if all(one.is_file() for one in moved) else found.paths
         return found.model_copy(update={"path": first, "further": tuple(further), "backup_folder": here})
 
-    @classmethod
-    def for_change(cls, change: ConfigChange, backup_folder: Path) -> "Receipt":
-        """The receipt that a commit of ``change`` keeps in ``backup_folder``."""
-        same = change.model_dump(include={"path", "format", "sha256_before", "sha256_after"})
-        return cls(**same, backup_folder=backup_folder.absolute(), further=change.paths[1:])
-
     @property
     def paths(self) -> tuple[Path, ...]:
         """All files of the config, the first one first."""

@@ -101,7 +101,12 @@ class ConfigLayout:
         Raises ``FileError`` if a text is no such config, or cannot hold its part of these; or if the
         geometry has values that no config may get.
         """
-        _require_physical(geometry)
+        positive = [geometry[kind.symbol] for kind in self.parameters.kinds if kind.is_positive]
+        if not np.isfinite(geometry.vector).all() or not all((one > 0.0).all() for one in positive):
+            raise FileError(
+                "the new geometry has values that are not finite, or lengths that are not above zero",
+                action="Nothing was written; identify again",
+            )
         values = dict(zip(self.parameters.names, geometry.vector.tolist(), strict=True))
         stand_ins = [Path(f"file {number}") for number, _ in enumerate(texts, start=1)]
         parts = self._parts(texts, [None] * len(texts))
@@ -182,16 +187,6 @@ def _require_places(wanted: Corrections, found: Corrections, places: Mapping[Cor
                 f"the controller's config has no place for corrections of {kind}",
                 action="Nothing was written; name the file that has it in [[controller.further_files]]",
             )
-
-
-def _require_physical(geometry: Geometry) -> None:
-    """Refuse values that are not finite, and lengths that are not above zero."""
-    positive = [geometry[kind.symbol] for kind in geometry.parameters.kinds if kind.is_positive]
-    if not np.isfinite(geometry.vector).all() or not all((values > 0.0).all() for values in positive):
-        raise FileError(
-            "the new geometry has values that are not finite, or lengths that are not above zero",
-            action="Nothing was written; identify again",
-        )
 
 
 def _not_in_one(name: str, having: Sequence[Path], paths: Sequence[Path]) -> FileError:

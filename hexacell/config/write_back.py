@@ -35,7 +35,8 @@ def commit(change: ConfigChange, backup_folder: Path) -> Receipt:
             written. Only if the message says so, the new config is in place and could not be undone.
         WriteBackUndone: it failed after the replacement; the config is unchanged.
     """
-    receipt = Receipt.for_change(change, backup_folder)
+    same = change.model_dump(include={"path", "format", "sha256_before", "sha256_after"})
+    receipt = Receipt(**same, backup_folder=backup_folder.absolute(), further=change.paths[1:])
     before, after = change.before_contents, change.after_contents
     found = read_contents(change.paths)
     if found == after and _is_complete(receipt):

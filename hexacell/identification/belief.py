@@ -176,10 +176,7 @@ class RobotBelief:
         kept[kept] = self.limits.allow_poses(poses[kept], joints[kept])
         return kept
 
-    def standing_at(
-        self, command: PoseBatch, actual: ActualPoses, wanted: Array | None = None
-    ) -> "RobotBelief":
+    def standing_at(self, command: PoseBatch, actual: ActualPoses, wanted: Array) -> "RobotBelief":
         """This belief with its limits widened where the robot is beyond them at a command (1)."""
-        wanted = self.least_margins if wanted is None else wanted
         at = command, actual.poses, actual.joints, wanted
         return replace(self, limits=self.limits.including(self.mechanism, self.estimate, *at))

@@ -20,9 +20,8 @@ import numpy as np
 from hexacell.identification.placement import RecordPlacement
 from hexacell.identification.solver.linear_model import LinearCosts
 from hexacell.identification.solver.result import Identification
-from hexacell.identification.terms.finding import Finding, TermFinding
 from hexacell.identification.terms.taken import deformed, spread_of
-from hexacell.identification.terms.term import ModelTerm
+from hexacell.identification.terms.term import Finding, ModelTerm, TermFinding
 
 ERROR_OF_FIRST_KIND = 0.01
 """Probability that any term is taken of a machine that has none."""

@@ -19,8 +19,7 @@ from hexacell.identification.data_faults.units import wrong_unit
 from hexacell.identification.problem.problem import LEAST_SPARE_EQUATIONS, Problem
 from hexacell.identification.solver import fit
 from hexacell.identification.solver.result import GaugeFaultError, Identification
-from hexacell.identification.terms.finding import Finding, TermFinding
-from hexacell.identification.terms.term import ModelTerm
+from hexacell.identification.terms.term import Finding, ModelTerm, TermFinding
 from hexacell.kinematics import rotations
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
@@ -75,7 +74,7 @@ def _without_faults(problem: Problem) -> tuple[Selection, tuple[TermFinding, ...
     if not problem.offered or problem.equations < unknowns:
         return select_faults(problem), ()
     quick = fit.fit_regularized(problem, fit.QUICK)
-    first = quick if quick.converged else fit.fit_regularized(problem)
+    first = quick if quick.termination.converged else fit.fit_regularized(problem)
     chosen = choose_terms(first)
     if any(one.log_factor > 0.0 for one in chosen.findings):
         # What they do is linearized where they do not bend the geometry.

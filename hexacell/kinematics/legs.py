@@ -52,21 +52,11 @@ class Legs:
         vectors = self.base_joints - self.platform_joints
         return vectors / np.sqrt(_dot(vectors, vectors))[..., None]
 
-    @property
-    def directions_in_carriers(self) -> Array:
-        """Unit vectors (n, 6, 3) along the legs in the frames of what carries their joints on the base."""
-        return self.in_carriers(self.directions)
-
     def in_carriers(self, directions: Array) -> Array:
-        """Vectors (n, 6, 3) of the legs in those frames, from the base frame."""
+        """Vectors (n, 6, 3) of the legs in the frames of what carries their joints on the base."""
         if self.carriers is None:
             return directions
         return np.asarray(np.einsum("nlij,nli->nlj", self.carriers, directions))
-
-    @property
-    def directions_in_platform(self) -> Array:
-        """Unit vectors (n, 6, 3) along the legs in the platform frame."""
-        return self.directions @ self.rotations
 
     def smallest_distance(self) -> Array:
         """Between any two legs (n,), mm: of the lines in their middles."""

@@ -37,8 +37,9 @@ class LegLimits:
 
     def spare_angles(self, legs: Legs) -> Array:
         """Angles (n, 2, 6), rad, that passive joints have left, at the base and at the platform."""
-        at_base = self.base_cones - angles_between(legs.directions_in_carriers, self.base_axes)
-        at_platform = self.platform_cones - angles_between(legs.directions_in_platform, self.platform_axes)
+        along = legs.directions
+        at_base = self.base_cones - angles_between(legs.in_carriers(along), self.base_axes)
+        at_platform = self.platform_cones - angles_between(along @ legs.rotations, self.platform_axes)
         spare = np.empty((len(at_base), 2, 6))
         spare[:, 0], spare[:, 1] = at_base, at_platform
         return spare

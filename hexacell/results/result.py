@@ -80,7 +80,7 @@ class IdentificationResult(Frozen):
         parameters, kept = found.geometry.parameters, zeros or found
         holds_at = found.problem.holds_at
         return cls(
-            converged=found.converged,
+            converged=found.termination.converged,
             termination=found.termination,
             iterations=found.solution.iterations,
             records=found.records,
@@ -102,13 +102,9 @@ class IdentificationResult(Frozen):
         )
 
     def document(self, parameters: ParameterSet) -> dict[str, Any]:
-        """The result as a JSON document, with a row for each of the ``parameters``."""
-        return self.model_dump(mode="json") | {"parameters": self._parameter_rows(parameters)}
-
-    def _parameter_rows(self, parameters: ParameterSet) -> list[dict[str, Any]]:
-        """Value and standard deviation of every parameter, in the order of the covariance."""
+        """The result as a JSON document, with a row for each of the ``parameters`` in order."""
         values, sigmas = parameters.vector(self.geometry), parameters.vector(self.sigma)
-        return [
+        rows = [
             {
                 "name": parameter.name,
                 "kind": parameter.kind.symbol,
@@ -121,6 +117,7 @@ class IdentificationResult(Frozen):
                 parameters.parameters, values.tolist(), sigmas.tolist(), strict=True
             )
         ]
+        return self.model_dump(mode="json") | {"parameters": rows}
 
     def estimate(self, parameters: ParameterSet) -> result.GeometryEstimate:
         """What the acceptance gates need."""

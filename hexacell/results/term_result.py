@@ -1,15 +1,14 @@
 """What an identification found beside the geometry, as data, and what of it a controller is to correct."""
 
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hexacell.cell.fields import Frozen
 from hexacell.cell.model import CellSettings
 from hexacell.identification.solver.result import Identification
-from hexacell.identification.terms.finding import Finding
-from hexacell.identification.terms.term import ModelTerm
+from hexacell.identification.terms.term import Finding, ModelTerm
 from hexacell.kinematics.corrections import NO_CORRECTIONS, NONE, CorrectionKind, Corrections, Six
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import joints_of
@@ -67,10 +66,6 @@ class FoundTerms:
         """The terms that the identification has."""
         return tuple(term for term in self.terms if term.is_taken)
 
-    def is_corrected(self, term: TermResult) -> bool:
-        """Whether the controller corrects a term."""
-        return any(self.corrections.of(term.name))
-
 
 NOTHING_FOUND = FoundTerms()
 
@@ -102,8 +97,10 @@ def known_terms(offered: Iterable[ModelTerm], results: Iterable[TermResult]) -> 
     """The terms of some results as they are known from these; they may have changed by a tenth."""
     by_name = {term.name: term for term in offered}
     return tuple(
-        by_name[one.name].identified_as(
-            np.array(one.values), np.hypot(one.sigma, CHANGE * np.abs(one.values))
+        replace(
+            by_name[one.name],
+            mean=np.array(one.values),
+            sigma=np.hypot(one.sigma, CHANGE * np.abs(one.values)),
         )
         for one in results
         if one.values is not None and one.sigma is not None and one.name in by_name

@@ -98,8 +98,9 @@ def _leg_limits(settings: CellSettings, controller: ControllerGeometry) -> LegLi
         return None
     legs = _legs_in_the_middle(settings, controller.branch)
     frames = settings.mechanism.normalize_frames(settings.drawing)[1]
-    base = _unit(legs.directions_in_carriers[0] if stated.base_axes is None else stated.base_axes)
-    platform = legs.directions_in_platform[0] if stated.platform_axes is None else stated.platform_axes
+    along = legs.directions
+    base = _unit(legs.in_carriers(along)[0] if stated.base_axes is None else stated.base_axes)
+    platform = (along @ legs.rotations)[0] if stated.platform_axes is None else stated.platform_axes
     base_cones, platform_cones = np.radians(cones)
     return LegLimits(
         base @ frames.base.T if legs.carriers is None else base,

@@ -151,7 +151,9 @@ class Archive:
         except UnicodeEncodeError as error:  # the name of a run, or of their folder, is no text
             raise self._unavailable(error) from error
         except SQLAlchemyError as error:
-            if self._file is None or not _is_damaged(error):
+            code = getattr(getattr(error, "orig", None), "sqlite_errorcode", None)
+            # Any other code is of a file that is no SQLite database, or has other tables than it should.
+            if self._file is None or code is None or code & 0xFF in _READ_ONLY_OR_BUSY:
                 raise self._unavailable(error) from error
         self._is_ready = False
         for path in (self._file, self._file.with_name(f"{INDEX}-journal")):
@@ -205,12 +207,6 @@ def open_engine(url: URL, otherwise: str = "") -> Engine:
 def _reason(error: Exception) -> str:
     """What the database said, in one line."""
     return " ".join(str(getattr(error, "orig", None) or error).split())
-
-
-def _is_damaged(error: SQLAlchemyError) -> bool:
-    """Whether a file is no SQLite database, or has other tables than it should."""
-    code = getattr(getattr(error, "orig", None), "sqlite_errorcode", None)
-    return code is not None and code & 0xFF not in _READ_ONLY_OR_BUSY
 
 
 @dataclass(frozen=True, slots=True)

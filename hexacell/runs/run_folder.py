@@ -206,7 +206,7 @@ def read_attempts(folder: RunFolder) -> StartAttempts | None:
         ) from error
 
 
-def note_attempt(folder: RunFolder, mode: str, attempt: StartAttempt) -> StartAttempts:
+def note_attempt(folder: RunFolder, mode: str, attempt: StartAttempt) -> None:
     """Add a try to those that a run folder keeps; the folder is made.
 
     Raises:
@@ -216,7 +216,6 @@ def note_attempt(folder: RunFolder, mode: str, attempt: StartAttempt) -> StartAt
     attempts = StartAttempts(mode=mode, attempts=(*(before.attempts if before else ()), attempt))
     create_folder_durably(folder.path)
     write_own(folder.attempts, f"{attempts.model_dump_json(indent=1)}\n".encode())
-    return attempts
 
 
 class DocumentKind(StrEnum):

@@ -18,8 +18,8 @@ from hexacell.errors import HexacellError
 from hexacell.plugins import plugin_failures_named
 from hexacell.printable import printable
 from hexacell.screen import overlays, tabs
-from hexacell.screen.further_screens import AssistantScreen, DigitsScreen, PlanScreen
 from hexacell.screen.preferences import KEYS, ONCE, SCREEN_THEMES, THEMES, ScreenAction, ScreenPreferences
+from hexacell.screen.tabs import AssistantScreen, DigitsScreen, PlanScreen
 from hexacell.screen.widgets import KeyLine
 from hexacell.text.screens.views import FaultView
 
@@ -92,10 +92,9 @@ class TechnicianApp(App[int]):
 
     def on_mount(self) -> None:
         """Load what is behind the screens once the first one is drawn."""
-        self.call_after_refresh(self._begin)
-
-    def _begin(self) -> None:
-        self.run_worker(self._attend(), exit_on_error=False, group="attend")
+        self.call_after_refresh(
+            lambda: self.run_worker(self._attend(), exit_on_error=False, group="attend")
+        )
 
     async def _attend(self) -> None:
         try:

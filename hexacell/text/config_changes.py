@@ -14,7 +14,7 @@ from hexacell.text.layout import wrapped
 
 if TYPE_CHECKING:
     from hexacell.kinematics.corrections import CorrectionChange
-    from hexacell.services.write_back.config_history import ConfigHistory, ConfigWrite
+    from hexacell.services.write_back.config_history import ConfigWrite
     from hexacell.services.write_back.config_rollback import ConfigRollback
     from hexacell.services.write_back.proposals import AppliedProposal
     from procedures.run.questions import PendingChange
@@ -78,14 +78,8 @@ _WRITES = {
 }
 
 
-def config_history_text(found: ConfigHistory) -> str:
-    """Each write into the config, the newest first: when and what; then who, how much and why."""
-    if not found.writes:
-        return NO_WRITES
-    return "\n".join(_write_text(one) for one in found.writes)
-
-
-def _write_text(write: ConfigWrite) -> str:
+def write_text(write: ConfigWrite) -> str:
+    """A write into the config: when and what; then who, how much and why."""
     one = write.record
     head = f"{one.at:%Y-%m-%d %H:%M:%S}  {_WRITES[one.kind].format(run=one.run)}"
     process = f", as {one.user} on {one.host}" if one.user else ""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from hexacell.cell.model import CellSettings
 from hexacell.checks.check_result import ParameterChange
 from hexacell.identification.diagnostics.tolerance_check import SIGNIFICANT_SIGMAS
+from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import ParameterSet, ParameterUnit
 from hexacell.kinematics.rotations import Array
 from hexacell.results.run_comparison import ParameterDifference
@@ -108,16 +109,15 @@ def _with_decimals(rows: Iterable[ParameterRow]) -> tuple[ParameterRow, ...]:
 
 def rows_of_run(state: RunState, settings: CellSettings | None) -> tuple[ParameterRow, ...]:
     """What a run identified, or what a check found to have changed; empty where nothing is known yet."""
-    from hexacell.services.history.recorded_cell import geometry_before  # noqa: PLC0415 - only for runs
-
     if state.judged is not None and state.judged.check is not None:
         return rows_of_changes(state.judged.check.changes)
     if state.identified is None or state.started is None or settings is None:
         return ()
     parameters, result = settings.mechanism.parameters, state.identified.result
+    before = settings.mechanism.normalize_frames(Geometry.of(parameters, state.started.controller))[0]
     return parameter_rows(
         parameters,
-        geometry_before(settings, state.started).vector,
+        before.vector,
         parameters.vector(result.geometry),
         parameters.vector(result.sigma),
         undetermined=frozenset(result.undetermined),

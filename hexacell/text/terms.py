@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from hexacell.identification.terms.finding import Finding
+from hexacell.identification.terms.term import Finding
 from hexacell.kinematics.corrections import NONE, CorrectionKind, Six
 from hexacell.lengths import ShownUnit, unit_of
 from hexacell.results.term_result import FoundTerms, TermResult
@@ -57,7 +57,7 @@ def _smallest_to_largest(numbers: Six, unit: ShownUnit) -> str:
 
 
 def _fate(term: TermResult, found: FoundTerms) -> str:
-    if found.is_corrected(term):
+    if any(found.corrections.of(term.name)):
         return "corrected by the controller"
     is_backlash, can_be = term.name == CorrectionKind.BACKLASH, term.name in {*CorrectionKind}
     rest = "scatter at work" if is_backlash else "the geometry does as much as it can"

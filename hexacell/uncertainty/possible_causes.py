@@ -14,7 +14,7 @@ Sources: Rao 1948 (score test); Theil 1961 (adjusted coefficient of determinatio
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -95,7 +95,8 @@ def _of_the_machine(test: ExcessTest) -> Iterator[PossibleCause]:
         ],
     }
     for name, parts in columns.items():
-        yield PossibleCause(name, test.share_of_columns(parts))
+        gain = test.gain(np.concatenate([*parts], axis=-1))
+        yield PossibleCause(name, test.share_of_gain(*gain))
     yield from _lost_place(test)
     yield from _weight_elsewhere(test)
 
@@ -166,10 +167,6 @@ class ExcessTest:
     """The score tests of columns (n, 3, k) beside the parameters of an identification."""
 
     found: Identification
-
-    def share_of_columns(self, parts: Iterable[Array]) -> float:
-        """The share (0 to 1) of the excess that columns (n, 3, k) explain together."""
-        return self.share_of_gain(*self.gain(np.concatenate([*parts], axis=-1)))
 
     def share_of_gain(self, gain: float, unknowns: int) -> float:
         """The share (0 to 1) that a decrease of the chi-square by some unknowns explains."""

@@ -72,7 +72,7 @@ def _noise_level(kind: str, level: NoiseLevel, unit: JointUnit) -> str:
 
 def _verdict(assessed: Assessment) -> str:
     found = assessed.found
-    if not found.converged:
+    if not found.termination.converged:
         return f"No result: the solver ended because {found.termination.value}."
     if assessed.tolerance_violations:
         return _beyond_tolerance(assessed.tolerance_violations, found.problem.mechanism.convention)

@@ -62,7 +62,7 @@ def checked(job: tuple[Calibrated, Array, int]) -> Outcome:
     known, change, number = job
     check = known.check()
     campaign = campaign_of(known, check, change, number)
-    stated = check.final_statement(campaign.measurements)
+    stated = check.final_statement(campaign.measurements, check.effects)
     assert stated is not None
     value, expanded = stated.errors.position.value, stated.errors.position.expanded
     true = error_of(check, change)

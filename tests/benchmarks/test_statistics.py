@@ -160,7 +160,7 @@ def test_every_robot_is_found(table_one, figure) -> None:
             continue
         found = identify(robot.problem(campaign.measured(0.01, random)))
         error = np.abs(found.free - robot.mechanism.convention.free_parameters(truth))
-        failed += not found.converged
+        failed += not found.termination.converged
         wrong += bool((error > SIGMAS * np.sqrt(np.diag(found.free_covariance))).any())
         short += found.records < len(campaign.joints)
     figure(f"of {ROBOTS} robots with +-7 mm errors: points out of reach, left out", unreachable)

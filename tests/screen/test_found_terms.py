@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import replace
 
-from hexacell.identification.terms.finding import Finding
+from hexacell.identification.terms.term import Finding
 from hexacell.kinematics.corrections import Corrections, Six
 from hexacell.results.result import ExpectedImprovement
 from hexacell.results.term_result import FoundTerms, TermResult

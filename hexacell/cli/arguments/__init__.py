@@ -4,8 +4,7 @@ import argparse
 
 from hexacell import __version__
 from hexacell.cli.arguments.commands import Parser
-from hexacell.cli.arguments.operation import OPERATION_COMMANDS, RESULT_COMMANDS
-from hexacell.cli.arguments.runs import RUN_COMMANDS, STUDY_COMMANDS
+from hexacell.cli.arguments.every import COMMANDS
 
 EXIT_CODES = """exit codes:
   0 done, within limits            4 an answer or approval is needed
@@ -33,6 +32,6 @@ def make_parser() -> Parser:
     commands = parser.add_subparsers(
         title="commands", prog="hexacell", metavar="COMMAND [...]", required=True
     )
-    for add in (*RUN_COMMANDS, *RESULT_COMMANDS, *OPERATION_COMMANDS, *STUDY_COMMANDS):
+    for add in COMMANDS:
         add(commands)
     return parser

@@ -34,10 +34,6 @@ class Parser(argparse.ArgumentParser):
         """Add the run."""
         self.add_argument("run", type=Path, metavar="RUN", help=what)
 
-    def add_archive(self, what: str) -> None:
-        """Add the address of an archive that cells share."""
-        add_value(self, "--archive", "URL", what)
-
     def add_json(self) -> None:
         """Add the choice of a JSON document."""
         add_flag(self, "--json", "one JSON document on stdout; text goes to stderr")

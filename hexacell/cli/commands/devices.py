@@ -60,7 +60,11 @@ def _search(options: argparse.Namespace, console: Console) -> ExitCode:
         if not is_interactive():
             raise AnswerNeeded("--write asks what no device reports", action="Start it at a terminal")
     for port in options.ports:
-        _require_port(port)
+        try:
+            TypeAdapter(SerialPortName).validate_python(port)
+        except ValidationError as refusal:
+            action = "Name a device path, socket://HOST:PORT or rfc2217://HOST:PORT"
+            raise UsageError(first_mistake(refusal, "the port"), action=action) from refusal
     buses = [_bus(words) for words in options.can]
     found = asyncio.run(search_devices(options.ports, buses, _address(options.controller)))
     text = found_devices.cell_text(found)
@@ -99,14 +103,6 @@ def _watch(options: argparse.Namespace, console: Console) -> ExitCode:
     for line in found_devices.diagnosis_lines(found):
         console.print(wrapped(line))
     return ExitCode.DONE if found.is_usable else ExitCode.HARDWARE
-
-
-def _require_port(name: str) -> None:
-    try:
-        TypeAdapter(SerialPortName).validate_python(name)
-    except ValidationError as refusal:
-        action = "Name a device path, socket://HOST:PORT or rfc2217://HOST:PORT"
-        raise UsageError(first_mistake(refusal, "the port"), action=action) from refusal
 
 
 def _bus(words: str) -> dict[str, Any]:

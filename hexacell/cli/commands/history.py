@@ -17,7 +17,7 @@ from hexacell.services.history.cell_status import fleet_runs
 from hexacell.services.history.drift_history import DriftHistory, drift_history
 from hexacell.services.history.run_index import RunIndex
 from hexacell.services.write_back.config_history import ConfigWrite, config_history
-from hexacell.text.config_changes import config_history_text
+from hexacell.text.config_changes import NO_WRITES, write_text
 from hexacell.text.history import comparison_text, drift_text, history_text, retention_text, watch_text
 from hexacell.text.line_face import run_story, story_text
 from procedures.journal.journal import read_entries
@@ -107,7 +107,8 @@ def _changes(cell: Cell, console: Console) -> None:
     for line in found.damaged:
         console.warn(f"{found.path}, line {line}: this record is torn, damaged or newer, and left out")
     writes = [_write_document(one) for one in found.writes]
-    console.show({"changes": writes, "damaged_lines": found.damaged}, config_history_text(found))
+    text = "\n".join(map(write_text, found.writes)) or NO_WRITES
+    console.show({"changes": writes, "damaged_lines": found.damaged}, text)
 
 
 def _comparison_document(before: RunFolder, after: RunFolder, compared: RunComparison) -> dict[str, Any]:

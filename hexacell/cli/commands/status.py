@@ -108,17 +108,15 @@ def metrics_text(found: Sequence[cell_status.CellStatus]) -> str:
     for one in found:
         for name, labels, value in _samples(one):
             named = {"cell": one.cell.settings.name, **labels}
-            shown = ",".join(f'{label}="{_escaped(text)}"' for label, text in named.items())
+            shown = ",".join(
+                f'{label}="{printable(text).translate(ESCAPES)}"' for label, text in named.items()
+            )
             samples[name].append(f"{name}{{{shown}}} {value}")
     return "".join(
         f"# HELP {name} {HELP[name]}\n# TYPE {name} gauge\n" + "".join(f"{line}\n" for line in lines)
         for name, lines in samples.items()
         if lines
     )
-
-
-def _escaped(text: str) -> str:
-    return printable(text).translate(ESCAPES)
 
 
 def _lines(one: cell_status.CellStatus) -> Iterator[str]:

@@ -62,10 +62,6 @@ class CorrectedFit:
         """Fit the records ``problem``, which are corrected for some faults."""
         return cls(original, problem, fit_regularized(problem, options, start), faults)
 
-    def corrected_for(self, hypothesis: hypotheses.FaultHypothesis) -> CorrectedFit:
-        """The fit after correction for one more fault."""
-        return self.fitted(self.original, hypothesis.corrected(self.problem), (*self.faults, hypothesis))
-
     @property
     def rejected(self) -> list[RecordId]:
         """The records rejected for gross errors."""
@@ -88,7 +84,7 @@ class CorrectedFit:
     def is_reliable(self) -> bool:
         """Whether the solution is good enough for first-order tests around it."""
         is_near = self.fit.goodness.ratio <= LARGEST_TRUSTED_RATIO
-        return not self.lost and self.fit.converged and is_near
+        return not self.lost and self.fit.termination.converged and is_near
 
     @property
     def is_consistent(self) -> bool:

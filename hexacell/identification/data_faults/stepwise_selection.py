@@ -146,7 +146,7 @@ def _forward(current: CorrectedFit) -> CorrectedFit:
     while len(current.rejected) < LARGEST_REJECTED_SHARE * current.original.records:
         extended = None if current.is_reliable else _searched(current)
         if extended is None:
-            if not current.fit.converged:  # the quick fit was cut short
+            if not current.fit.termination.converged:  # the quick fit was cut short
                 current = current.fitted(current.original, current.problem, current.faults, COARSE)
             # The hypothesis of lowest cost that is confirmed.
             ranked = current.likely_hypotheses() if current.is_reliable else ()
@@ -199,7 +199,8 @@ def refitted(current: CorrectedFit, hypothesis: FaultHypothesis) -> CorrectedFit
                 return None
         case GaugeFaultHypothesis() if not current.problem.is_overdetermined:
             return None
-    return current.corrected_for(hypothesis)
+    corrected = hypothesis.corrected(current.problem)
+    return CorrectedFit.fitted(current.original, corrected, (*current.faults, hypothesis))
 
 
 def _refused(current: CorrectedFit, extended: CorrectedFit) -> UncorrectableFaultError | None:

@@ -58,6 +58,9 @@ SMALLER = 0.25
 LEAST_GAIN = 1e-3
 """Share of T that a step must gain to count."""
 
+STEPS = 5
+"""Steps of :func:`largest_change`; turns of some degrees need three."""
+
 NO_CONTRADICTION = 1.0
 """A value of T below any limit: better frames need not be looked for."""
 
@@ -107,7 +110,7 @@ def tolerance_violations(
 def _named(fitter: ToleranceFitter, fit: ToleranceFit) -> tuple[ToleranceViolation, ...]:
     """The violations of joints without whose tolerances there is a robot; ``fit`` is within all of them."""
     faults, others = list[Joint](), list[Joint]()
-    while fit.is_contradicted:
+    while fit.distance > fit.limit:  # no robot within the tolerances explains the identified geometry
         pressing = {joint: _rows(fitter, [*faults, joint]) for joint in _pressing(fitter, fit)}
         tried = {joint: fitter.fit(fit.frames, rows) for joint, rows in pressing.items()}
         best = min(tried, key=lambda joint: tried[joint].distance)
@@ -115,7 +118,7 @@ def _named(fitter: ToleranceFitter, fit: ToleranceFit) -> tuple[ToleranceViolati
         others = [
             joint
             for joint, one in tried.items()
-            if joint != best and not faults and not one.is_contradicted and one.distance < as_well
+            if joint != best and not faults and one.distance <= one.limit and one.distance < as_well
         ]
         fit, faults = tried[best], [*faults, best]
     rows = _rows(fitter, faults)
@@ -178,11 +181,6 @@ class ToleranceFit:
     limit: float
     pressure: Array
 
-    @property
-    def is_contradicted(self) -> bool:
-        """Whether no robot within the tolerances explains the identified geometry."""
-        return self.distance > self.limit
-
 
 @dataclass(frozen=True, eq=False)
 class ToleranceFitter:
@@ -208,7 +206,7 @@ class ToleranceFitter:
             if not at.distance(best) < (1.0 - LEAST_GAIN) * distance:
                 return at.result(best)
             change = np.zeros(9)
-            change[self.frame_columns] = best[: at.frame_count] * self.frame_scales
+            change[self.mechanism.frame_freedom.columns] = best[: at.frame_count] * self.frame_scales
             there = _Step(self, at.frames.then(small_change(change)), without)
             moved = np.concatenate([np.zeros(at.frame_count), best[at.frame_count :]])
             if there.distance(moved) < (1.0 - LEAST_GAIN) * distance:
@@ -240,20 +238,15 @@ class ToleranceFitter:
         def changed(change: Array) -> Array:
             return self.mechanism.change_frames(there, small_change(change)).vector
 
-        steps = STEP * np.eye(9)[self.frame_columns]
+        steps = STEP * np.eye(9)[self.mechanism.frame_freedom.columns]
         derivatives = np.array([changed(step) - changed(-step) for step in steps]).T / (2.0 * STEP)
         return np.asarray(derivatives * self.frame_scales / self.widths[:, None])
-
-    @property
-    def frame_columns(self) -> list[int]:
-        """Which k of nine small changes are free."""
-        return self.mechanism.frame_freedom.columns
 
     @cached_property
     def frame_scales(self) -> Array:
         """(k,) shifts, mm, and turns, rad, that move the platform's joints by the same."""
         radius = float(self.mechanism.platform_radius(self.drawing))
-        return np.repeat([radius, 1.0, 1.0], 3)[self.frame_columns]
+        return np.repeat([radius, 1.0, 1.0], 3)[self.mechanism.frame_freedom.columns]
 
     def _in(self, frames: FrameTransform, vector: Array) -> Array:
         """Parameters (P,) in other frames."""
@@ -278,7 +271,7 @@ class _Step:
         self.moving = np.hstack([fitter.by_frames(frames), by_ball])
         self.columns = np.linalg.solve(self.root, np.hstack([self.moving, -np.eye(len(self.largest))]))
         self.constant = np.linalg.solve(self.root, fitter.difference(frames))
-        self.frame_count = len(fitter.frame_columns)
+        self.frame_count = len(fitter.mechanism.frame_freedom.columns)
 
     @property
     def start(self) -> Array:
@@ -328,3 +321,41 @@ def small_change(change: Array) -> FrameTransform:
     """A change of the frames by a shift, mm, a turn of the base and one of the platform, rad (9,)."""
     shift, base, platform = change.reshape(3, 3)
     return FrameTransform(rotations.from_vector(base), shift, rotations.from_vector(platform))
+
+
+def largest_change(
+    mechanism: Mechanism, before: Geometry, geometry: Geometry, tolerances: Tolerances
+) -> float:
+    """The largest change of a parameter from one geometry to another, in the best choice of frames.
+
+    In the frames of the convention a robot within tolerances of 7 mm differs by up to 30 mm from its
+    drawing, because the few joints that define them are off as well. The frames are therefore fitted to
+    all parameters, each in units of its tolerance, by Gauss-Newton steps; and where the ball may be mounted
+    elsewhere, its offset.
+
+    Args:
+        mechanism: of both.
+        before: in its own frames.
+        geometry: in the mechanism's frame convention.
+        tolerances: what changes of different parameters are compared by.
+
+    Returns:
+        mm, or mrad of an angle; infinite where the geometry is not a number.
+    """
+    if not np.isfinite(geometry.vector).all():
+        return float("inf")
+    count = len(before.vector)
+    fitter = ToleranceFitter(mechanism, before, tolerances, geometry, np.zeros((count, count)))
+    frames = mechanism.normalize_frames(before)[1].inverse()
+    columns = mechanism.frame_freedom.columns
+    coordinates, turned = 3 if tolerances.ball_mm else 0, len(columns)
+    ball = (before.parameters.ball_offset.T / fitter.widths[:, None])[:, :coordinates]
+    offset = np.zeros(coordinates)
+    for _ in range(STEPS):
+        moving, difference = fitter.by_frames(frames), fitter.difference(frames) + ball @ offset
+        solved = np.linalg.lstsq(np.hstack([moving, ball]), -difference, rcond=None)[0]
+        step = np.zeros(9)
+        step[columns] = solved[:turned] * fitter.frame_scales
+        frames, offset = frames.then(small_change(step)), offset + solved[turned:]
+    differences = fitter.difference(frames) + ball @ offset
+    return float(np.abs(differences * fitter.widths / before.parameters.like_a_mm).max())

@@ -13,7 +13,7 @@ from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.linear_model import LinearCosts, LinearizedModel
 from hexacell.identification.solver.measurement_model import NuisanceElimination, Prediction
 from hexacell.identification.solver.term_estimates import TermEstimates
-from hexacell.identification.terms.finding import TermFinding
+from hexacell.identification.terms.term import TermFinding
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
@@ -295,11 +295,6 @@ class Identification:
     def termination(self) -> Termination:
         """Why the solver ended."""
         return self.solution.termination
-
-    @property
-    def converged(self) -> bool:
-        """Whether the solver reached a minimum."""
-        return self.termination.converged
 
     @property
     def left_out(self) -> tuple[tuple[RecordId, DataFault], ...]:

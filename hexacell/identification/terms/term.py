@@ -8,7 +8,8 @@ that is stated of the term.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from enum import StrEnum
 
 import numpy as np
 
@@ -22,6 +23,38 @@ joints arrived from some directions (n, 6)."""
 
 ErrorsOfSizes = Callable[[Placement, Array, Array], Array]
 """Likewise (n, 6, k) by each of k independent causes, for coefficients of some sizes (6,)."""
+
+
+class Finding(StrEnum):
+    """What the records say of a term."""
+
+    TAKEN = "taken"
+    KNOWN = "known from an earlier result"
+    NOT_SHOWN = "not shown"
+    NOT_PREDICTED = "does not predict the records of other points better"
+    FAULTS = "faults of records explain them better"
+    ONE_SIDE = "is the same at every stop, as all were reached from one side"
+    NOT_DISTINCT = "cannot be told apart from another"
+
+
+@dataclass(frozen=True, slots=True)
+class TermFinding:
+    """A term that was tried.
+
+    Attributes:
+        log_factor: logarithm of the Bayes factor, beside the terms that were taken before it.
+        predicted: by how much the logarithm of the density of points' records, predicted from all other
+            points, is higher with it; NaN where that was not asked.
+        rival: the term that it cannot be told from.
+        told_by: the records that would tell, in words.
+    """
+
+    name: str
+    finding: Finding
+    log_factor: float
+    predicted: float = np.nan
+    rival: str = ""
+    told_by: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,10 +110,6 @@ class ModelTerm:
     of_weight: "Callable[[Weight], ModelTerm] | None" = None
     mean: Array = field(default_factory=lambda: np.zeros(LEGS))
     sigma: Array | None = None
-
-    def identified_as(self, values: Array, sigma: Array) -> "ModelTerm":
-        """The term with coefficients (6,) as they were identified, with what is not known of them."""
-        return replace(self, mean=values, sigma=sigma)
 
     @property
     def spread(self) -> Array:

@@ -49,12 +49,6 @@ def started_robot(settings: CellSettings, started: RunStarted) -> Robot:
     return make_robot(settings, commanding, taught=Geometry.of(parameters, started.taught))
 
 
-def geometry_before(settings: CellSettings, started: RunStarted) -> Geometry:
-    """The controller's geometry when the run began, in the mechanism's frame convention."""
-    mechanism = settings.mechanism
-    return mechanism.normalize_frames(Geometry.of(mechanism.parameters, started.controller))[0]
-
-
 def noise_of_run(folder: RunFolder, settings: CellSettings) -> MeasuredNoise | None:
     """The noise that a run measured; None if it did not, or the folder is not that of a run."""
     measured = _state_of(folder, settings).noise

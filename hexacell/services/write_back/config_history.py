@@ -4,7 +4,7 @@ They are recorded beside the run folders. Where a record could not be written, a
 own folder has when it was, who approved it and why: in its journal, and ``applied.json``.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
@@ -24,7 +24,7 @@ from hexacell.errors import HexacellError
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.write_back.config_rollback import receipts_of
 from hexacell.verdict.decision import Verdict
-from procedures.journal.journal import Entry, read_entries
+from procedures.journal.journal import read_entries
 from procedures.run.state import RunState, apply
 from procedures.steps import events
 from procedures.steps.roll_back import reason_to_take_back
@@ -129,21 +129,17 @@ def _in_milliseconds(at: datetime) -> datetime:
 def _read(run: RunFolder, receipt: Receipt) -> _Run:
     state, noted = RunState(), list[WriteRecord]()
     for entry in read_entries(run.journal):
-        noted += _noted_in(entry, state, run, receipt)
+        match entry.event:
+            case events.Committed(approved_by=by):
+                noted.append(_record(WriteKind.RESULT, entry.at, by, run, receipt))
+            case events.RolledBack() if state.committed is not None:
+                why = reason_to_take_back(state)
+                noted.append(_record(WriteKind.TAKEN_BACK, entry.at, THE_RUN, run, receipt, why))
         state = apply(state, entry.event)
     if (approval := later_approval(run)) is not None:
         noted.append(_record(WriteKind.APPLIED, approval.at, approval.by, run, receipt))
     line = state.judged.line if state.judged else ""
     return _Run(run.name, tuple(noted), state.verdict, line)
-
-
-def _noted_in(entry: Entry, state: RunState, run: RunFolder, receipt: Receipt) -> Iterator[WriteRecord]:
-    """The write that a line of the journal notes, if any; ``state`` is that before it."""
-    match entry.event:
-        case events.Committed(approved_by=by):
-            yield _record(WriteKind.RESULT, entry.at, by, run, receipt)
-        case events.RolledBack() if state.committed is not None:
-            yield _record(WriteKind.TAKEN_BACK, entry.at, THE_RUN, run, receipt, reason_to_take_back(state))
 
 
 def _record(

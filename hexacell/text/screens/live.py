@@ -233,8 +233,20 @@ def plan_rows(settings: CellSettings, planned: Sequence[VisitedPose]) -> Iterato
             what = " ".join(f"{axis} {value:.1f}" for axis, value in zip("xyzabc", one.pose, strict=True))
             what += f", within {one.within_mm:g} mm, {one.within_deg:g} deg" if one.within_deg else ""
         yield f"e{number}", f"OUT  e{number}  {what}"
-    if planned:
-        yield from _poses(settings, planned)
+    if not planned:
+        return
+    excluded = settings.excluded_commands
+    for number, position in enumerate(points, start=1):
+        if number in settings.excluded_points:
+            continue
+        here = [one for one in planned if one[0] == number and excluded.allows(one[2].as_tuple())]
+        yield str(number), f"     point {number}, {_place(position)}: {len(here)} records"
+        for _, orientation, pose in here:
+            name = f"{number}.{orientation}"
+            reference = "  reference" if orientation == 1 else ""
+            angles = zip("abc", pose.as_tuple()[3:], strict=True)
+            shown = "  ".join(f"{axis} {value:6.1f}" for axis, value in angles)
+            yield name, f"     {name:>7}  {shown} deg{reference}"
 
 
 def plan_lines(settings: CellSettings, tried: Sequence[str], *, is_trying: bool) -> list[str]:
@@ -249,22 +261,6 @@ def exclusions_text(settings: CellSettings) -> str:
     poses = len(settings.excluded_commands.commands)
     parts = [*([f"{poses} pose{'s' * (poses > 1)}"] if poses else []), *points]
     return f"Excluded by the cell file: {', '.join(parts)}." if parts else ""
-
-
-def _poses(settings: CellSettings, planned: Sequence[VisitedPose]) -> Iterator[tuple[str, str]]:
-    """A row for each point that is measured, and below it one for each of its poses."""
-    excluded = settings.excluded_commands
-    for number, position in enumerate(settings.identification.points, start=1):
-        if number in settings.excluded_points:
-            continue
-        here = [one for one in planned if one[0] == number and excluded.allows(one[2].as_tuple())]
-        yield str(number), f"     point {number}, {_place(position)}: {len(here)} records"
-        for _, orientation, pose in here:
-            name = f"{number}.{orientation}"
-            reference = "  reference" if orientation == 1 else ""
-            angles = zip("abc", pose.as_tuple()[3:], strict=True)
-            shown = "  ".join(f"{axis} {value:6.1f}" for axis, value in angles)
-            yield name, f"     {name:>7}  {shown} deg{reference}"
 
 
 def _place(pose: Sequence[float]) -> str:

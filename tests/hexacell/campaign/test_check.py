@@ -34,7 +34,7 @@ def changed(check: Check, change: np.ndarray) -> Geometry:
 
 
 def said(check: Check, measurements: MeasurementSet) -> CheckStatement:
-    stated = check.final_statement(measurements)
+    stated = check.final_statement(measurements, check.effects)
     assert stated is not None
     return stated
 

@@ -78,10 +78,10 @@ def test_an_estimate_that_ends_next_to_a_singularity_is_repeated_from_other_star
     """Robots, by number, for which a singularity is between the drawing and both records."""
     measurements = measured(plan, robot_number(plan, number), [plan.reference_pose(1), small_turn])
     assert np.abs(measurements.records[1].deviation).max() > 2.0
-    assert not estimate_online(plan.robot.problem(measurements)).converged
+    assert not estimate_online(plan.robot.problem(measurements)).termination.converged
     found = OnlineEstimator(plan.robot).estimate(measurements).identification
     assert found is not None
-    assert found.converged
+    assert found.termination.converged
     assert found.chi2 < 10.0
     again = OnlineEstimator(plan.robot).estimate(measurements).identification
     assert again is not None

@@ -94,7 +94,8 @@ def test_many_commands_are_judged_as_each_of_them_is(know, paper, limits, sigma,
     level = know(paper.nominal)
     legs = level.mechanism.legs(level.estimate, one(0), level.commanded.joints(one(0)))
     wide, narrow = np.full(6, np.pi), np.full(6, np.radians(20.0))
-    cones = LegLimits(legs.directions[0], legs.directions_in_platform[0], wide, narrow, distance_mm=0.0)
+    base, platform = legs.directions[0], (legs.directions @ legs.rotations)[0]
+    cones = LegLimits(base, platform, wide, narrow, distance_mm=0.0)
     tight = replace(limits, legs=cones, singularity_margin=margin)
     known = know(paper.nominal, sigma, limits=tight)
     together = stands_within_limits(known, COMMANDS, certainly=certainly)
@@ -110,7 +111,7 @@ def test_what_is_not_known_of_a_robot_keeps_it_from_its_limits(know, paper, limi
     known, vague = (know(paper.nominal, sigma, limits=limits) for sigma in (0.001, 0.2))
     actual = known.commanded.actual_poses(one(4))
     legs = known.mechanism.legs(known.estimate, actual.poses, actual.joints)
-    axes = legs.directions_in_carriers[0], legs.directions_in_platform[0]
+    axes = legs.in_carriers(legs.directions)[0], (legs.directions @ legs.rotations)[0]
     just = LegLimits(*axes, np.full(6, np.radians(1.0)), np.full(6, np.radians(1.0)), distance_mm=0.0)
     for belief, certainly, expected in ((known, True, True), (vague, False, True), (vague, True, False)):
         limited = replace(belief, limits=replace(limits, legs=just))

@@ -141,7 +141,7 @@ def cones(degrees, distance=0.0):
     def around(geometry, branch):
         legs = hexaglide.legs(geometry, poses, hexaglide.inverse(geometry, branch, poses))
         wide, narrow = np.full(6, np.pi), np.full(6, np.radians(degrees))
-        return LegLimits(legs.directions[0], legs.directions_in_platform[0], wide, narrow, distance)
+        return LegLimits(legs.directions[0], (legs.directions @ legs.rotations)[0], wide, narrow, distance)
 
     return around
 

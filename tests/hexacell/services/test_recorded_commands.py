@@ -131,5 +131,5 @@ def test_records_in_a_run_folder_are_fitted_after_the_controller_got_other_frame
     (tmp_path / "run").mkdir()
     controller = Hexaglide().change_frames(paper.nominal, ON_FLOOR)
     assessed = fit_measurements(cell, told, run_of(tmp_path / "run", started(controller, paper)))
-    assert assessed.found.converged
+    assert assessed.found.termination.converged
     assert assessed.found.geometry.largest_difference(paper.actual) < 0.5

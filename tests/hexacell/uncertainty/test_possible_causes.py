@@ -132,6 +132,6 @@ def test_the_gain_of_columns_is_what_the_records_without_the_cause_save(found_wi
     wrong = found_with(deviations=moved_by(placement, effect, np.array([0.0, 0.0, -20.0])))
     saved = wrong.goodness.chi2 - clean.goodness.chi2
     test = ExcessTest(wrong)
-    assert test.share_of_columns(test.by_effects(effect)) == pytest.approx(
+    assert test.share_of_gain(*test.gain(*test.by_effects(effect))) == pytest.approx(
         test.share_of_gain(saved, 3), abs=0.02
     )

@@ -104,7 +104,7 @@ def test_data_that_determine_few_parameters_give_no_result(visit, assessed_of):
     verdict = findings(assessed)[0]
     assert verdict.startswith("Incomplete: these records leave ")
     assert "Measure at more points" in verdict
-    assert assessed.found.converged
+    assert assessed.found.termination.converged
     assert not assessed.refused
     assert not assessed.is_usable
 

@@ -31,7 +31,8 @@ def robot() -> Robot:
 def belief(robot: Robot) -> RobotBelief:
     truth, frames = truth_of(bundled(), robot, 0), robot.mechanism.normalize_frames(robot.drawing)[1]
     down = frames.base @ DOWN
-    term = play(0.1, Weight(down, np.array(CENTRE_MM))).identified_as(np.full(6, PLAY_MM), np.full(6, 0.01))
+    loose = play(0.1, Weight(down, np.array(CENTRE_MM)))
+    term = replace(loose, mean=np.full(6, PLAY_MM), sigma=np.full(6, 0.01))
     free = robot.mechanism.convention.free_parameters(truth)
     return replace(robot.belief(), free=free, terms=TermEstimates.expected((term,), len(free)))
 

@@ -89,7 +89,8 @@ def test_a_controller_that_corrects_backlash_does_not_scatter(allowances: Allowa
     assert allowances.found is not None
     assert allowances.found.terms is not None
     [term] = allowances.found.terms.terms
-    lost = term.identified_as(*allowances.found.terms.of("backlash"))
+    mean, sigma = allowances.found.terms.of("backlash")
+    lost = replace(term, mean=mean, sigma=sigma)
     corrected = Corrections(backlash=tuple(BACKLASH.tolist()))
     checked = replace(allowances.robot, known_terms=(lost,), corrections=corrected)
     knows = replace(allowances, robot=checked, found=None)

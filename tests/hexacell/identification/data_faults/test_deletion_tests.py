@@ -124,7 +124,8 @@ def test_one_lost_record_does_not_make_a_fit_better_by_far_than_one_that_has_it(
     rows = np.arange(problem.records) > 0
     lost = CorrectedFit(problem, problem, fit_regularized(problem.subset(rows)))
     assert not whole.is_better_by_far_than(lost)
-    assert whole.is_better_by_far_than(lost.corrected_for(ALL_IN_INCHES))
+    in_mm = ALL_IN_INCHES.corrected(problem)
+    assert whole.is_better_by_far_than(CorrectedFit.fitted(problem, in_mm, (ALL_IN_INCHES,)))
 
 
 @pytest.mark.parametrize(
@@ -147,7 +148,7 @@ def test_a_gauge_fault_is_confirmed_by_agreement_or_by_far_smaller_residuals(
     assert not current.is_consistent
     assert corrected.is_consistent is (after_mm < 0.05)
     assert corrected.fit.goodness.chi2 < (1.0 - gain) * current.fit.goodness.chi2
-    monkeypatch.setattr(CorrectedFit, "corrected_for", lambda *_: corrected)
+    monkeypatch.setattr(CorrectedFit, "fitted", lambda *_: corrected)
     found = confirmed_by_refit(current, replace(ALL_IN_INCHES, gain=gain * current.fit.goodness.chi2))
     assert found is (corrected if confirmed else None)
 

@@ -99,7 +99,7 @@ def test_the_number_reported_as_missing_is_enough(visit, make_problem):
     """Two more than the 12 above."""
     exact = visit(points=2, orientations=7, seed=1)
     found = identify(make_problem(exact.measured(), noise=Noise(1e-4, 1e-4)))
-    assert found.converged
+    assert found.termination.converged
     assert found.dof == 1
 
 
@@ -128,4 +128,4 @@ def test_meaningless_deviations_never_give_a_good_fit(visit, make_problem):
     random = np.random.default_rng(0)
     nonsense = altered(measured, lambda _: {"deviation": random.uniform(-5, 5, 3)})
     found = identify(make_problem(nonsense), find_outliers=False)
-    assert not found.converged or found.chi2 > 1000 * found.dof
+    assert not found.termination.converged or found.chi2 > 1000 * found.dof

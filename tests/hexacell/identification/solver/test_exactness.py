@@ -20,7 +20,7 @@ SEEDS = range(5)
 
 
 def assert_exact(found, true, records):
-    assert found.converged
+    assert found.termination.converged
     assert found.geometry.largest_difference(true) < EXACT_MM
     assert found.records == records
     assert found.data_faults == ()

@@ -73,7 +73,7 @@ def small_tilts(visit, make_problem):
 
 
 def test_parameters_undetermined_by_small_tilts_are_named(small_tilts):
-    assert small_tilts.converged
+    assert small_tilts.termination.converged
     assert len(small_tilts.undetermined) >= 5
     told = dict(zip(HEXAGLIDE_PARAMETERS.names, small_tilts.sigma / 7.0 * np.sqrt(3.0), strict=True))
     for name in small_tilts.undetermined:
@@ -91,7 +91,7 @@ def test_the_online_estimate_starts_without_records(paper, visit, make_problem):
     measured = visit(seed=2).measured()
     first = type(measured)(measured.records[:1])
     estimate = estimate_online(make_problem(first))
-    assert estimate.converged
+    assert estimate.termination.converged
     np.testing.assert_allclose(estimate.geometry.vector, paper.nominal.vector, atol=1e-9)
     np.testing.assert_allclose(
         estimate.free_covariance, estimate.problem.prior.covariance, rtol=1e-6, atol=1e-6

@@ -36,7 +36,7 @@ def test_the_scatter_of_repeated_estimates_agrees_with_every_sigma_and_all_toget
 def test_clean_records_are_never_left_out(repeated):
     assert [found.data_faults for found in repeated] == [()] * len(repeated)
     assert {found.records for found in repeated} == {55}
-    assert all(found.converged for found in repeated)
+    assert all(found.termination.converged for found in repeated)
     assert {found.undetermined for found in repeated} == {()}
 
 

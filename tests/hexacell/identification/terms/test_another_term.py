@@ -12,7 +12,7 @@ from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.cell.uncertainty import ModelSettings
 from hexacell.identification.estimator import identify
-from hexacell.identification.terms.finding import Finding
+from hexacell.identification.terms.term import Finding
 from hexacell.kinematics.corrections import CorrectionKind, Corrections
 from hexacell.plugins import Group
 from hexacell.results.term_result import FoundTerms, corrections_for, term_results

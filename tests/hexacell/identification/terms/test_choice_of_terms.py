@@ -17,7 +17,7 @@ from hexacell.identification.placement import Weight
 from hexacell.identification.solver.measurement_model import predict
 from hexacell.identification.solver.result import Identification
 from hexacell.identification.terms.compliance import compliance
-from hexacell.identification.terms.finding import Finding
+from hexacell.identification.terms.term import Finding
 from hexacell.kinematics.corrections import CorrectionKind
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array

@@ -64,4 +64,4 @@ def test_joints_at_the_base_turn_with_their_cranks(drawing: Geometry) -> None:
     np.testing.assert_allclose(legs.carriers[..., 0], arms, atol=1e-9)
     np.testing.assert_allclose(np.linalg.det(legs.carriers), 1.0, atol=1e-9)
     cosines = np.einsum("nij,nij->ni", arms, legs.directions)
-    np.testing.assert_allclose(legs.directions_in_carriers[..., 0], cosines, atol=1e-9)
+    np.testing.assert_allclose(legs.in_carriers(legs.directions)[..., 0], cosines, atol=1e-9)

@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from textual.app import App
 
-from hexacell.cli.commands.status import _escaped
+from hexacell.cli.commands.status import escaped
 from hexacell.cli.console import Console
 from hexacell.cli.process import fault_line, log
 from hexacell.printable import printable
@@ -63,7 +63,7 @@ def test_no_notice_page_or_metric_has_any(text) -> None:
     notice = a_notice(line=text, run=text, host=text)
     assert raw_signs(f"{notice.line}{notice.run}{notice.host}{notice.title}") == []
     assert raw_signs(html_of(report(text)).replace("\t", "")) == []
-    assert raw_signs(_escaped(text)) == []
+    assert raw_signs(escaped(text)) == []
 
 
 def test_no_log_or_report_of_a_fault_has_any(tmp_path, monkeypatch) -> None:

@@ -108,15 +108,18 @@ def metrics_text(found: Sequence[cell_status.CellStatus]) -> str:
     for one in found:
         for name, labels, value in _samples(one):
             named = {"cell": one.cell.settings.name, **labels}
-            shown = ",".join(
-                f'{label}="{printable(text).translate(ESCAPES)}"' for label, text in named.items()
-            )
+            shown = ",".join(f'{label}="{escaped(text)}"' for label, text in named.items())
             samples[name].append(f"{name}{{{shown}}} {value}")
     return "".join(
         f"# HELP {name} {HELP[name]}\n# TYPE {name} gauge\n" + "".join(f"{line}\n" for line in lines)
         for name, lines in samples.items()
         if lines
     )
+
+
+def escaped(text: str) -> str:
+    """A text as a value of a metric's label has it."""
+    return printable(text).translate(ESCAPES)
 
 
 def _lines(one: cell_status.CellStatus) -> Iterator[str]:

@@ -96,7 +96,7 @@ class CorrectedFit:
         """Whether it is of all records, and within the tolerances, however large the residuals are."""
         prior = self.problem.prior
         is_near = prior.squared_distance(self.fit.free) <= LARGEST_MEAN_SQUARE * len(prior.free)
-        return not self.lost and self.fit.converged and is_near
+        return not self.lost and self.fit.termination.converged and is_near
 
     @property
     def misfit(self) -> float:

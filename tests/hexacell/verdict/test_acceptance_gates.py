@@ -10,7 +10,7 @@ from hexacell.identification.diagnostics.tolerance_check import largest_change, 
 from hexacell.identification.problem.prior import Noise, Tolerances
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.result import Termination
-from hexacell.identification.terms.finding import Finding
+from hexacell.identification.terms.term import Finding
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.lengths import shown

@@ -73,15 +73,12 @@ def test_one_leg_with_a_smaller_cone_alone_refuses_a_pose(cell):
     assert problem.endswith(" deg in its platform joint, beyond 10")
 
 
-def test_reach_is_the_controllers_not_the_drawings(cell):
+def test_reach_is_the_controllers_and_stated_axes_take_the_place_of_the_legs(cell) -> None:
     robot = robot_of(cell)
     short = hexaglide_geometry(robot.drawing["S"], robot.drawing["B"], np.full(6, 450.0))
     other = make_robot(cell.settings, ControllerGeometry(short, robot.branch))
     assert any("leg 1" in problem for problem in broken_limits(other, Pose(0, 0, 600)))
-
-
-def test_stated_axes_of_passive_joints_take_the_place_of_the_legs_directions(cell):
-    """Straight down, as some machines have them: the inclined legs are far from that."""
+    # Straight down, as some machines have them: the inclined legs are far from that.
     down = [(0.0, 0.0, -2.0)] * 6
     robot = with_limits(cell, passive_joints={"base_cone_deg": 30.0, "base_axes": down})
     assert robot.limits.legs is not None

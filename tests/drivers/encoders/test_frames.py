@@ -85,7 +85,7 @@ def sending(channel: str, *messages: can.Message) -> Iterator[None]:
         bus.close()
 
 
-def test_a_stranger_among_nodes_is_told_with_length_and_rate(raw) -> None:
+def test_a_stranger_among_nodes_or_another_bit_rate_is_told(raw) -> None:
     strange = (frame(STRANGER, b"\1\2\3"), frame(EXTENDED, bytes(8), is_extended_id=True))
     with sending(raw.channel, *strange, frame(0x701, b"\5"), frame(0x80, b"")):
         found = search_bus({"interface": "virtual", "channel": raw.channel}, QUICK)
@@ -93,9 +93,6 @@ def test_a_stranger_among_nodes_is_told_with_length_and_rate(raw) -> None:
     told = [(one.identifier, one.is_extended, one.length) for one in found.frames]
     assert told == [(STRANGER, False, 3), (EXTENDED, True, 8)]
     assert all(one.per_second > 0 for one in found.frames)
-
-
-def test_a_bus_of_another_bit_rate_is_told() -> None:
     channel = "another-bit-rate"
     with sending(channel, can.Message(is_error_frame=True)):
         found = search_bus({"interface": "virtual", "channel": channel}, QUICK)

@@ -68,14 +68,11 @@ async def test_an_older_indicator_without_parameters_is_accepted(dialogue, gauge
     await gauge.check()
 
 
-async def test_one_lost_answer_does_not_mean_that_there_are_no_parameters(dialogue, gauge):
+async def test_one_lost_answer_or_denial_does_not_mean_that_there_are_no_parameters(dialogue, gauge):
     asked = opening(p021=b"1\r\n")
     dialogue.expect(asked[0], (b"?p011\r",), *asked[1:], *2 * asked)
     with pytest.raises(WrongSetting, match="hold"):
         await gauge.open()
-
-
-async def test_a_parameter_is_absent_only_if_that_is_said_twice(dialogue, gauge):
     asked = opening(p021=b"1\r\n")
     dialogue.expect(*asked[:3], (b"?p021\r", b"NOT FOUND\r\n"), *asked[3:], *2 * asked)
     with pytest.raises(WrongSetting, match="hold"):

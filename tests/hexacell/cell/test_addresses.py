@@ -77,15 +77,12 @@ def test_what_makes_no_sense_is_refused(settings) -> None:
         NotificationSettings.model_validate({"name": "one", "url": "mqtt://x"} | settings)
 
 
-def test_a_word_that_is_no_occasion_is_answered_with_each_that_is_once(load_with) -> None:
+def test_a_word_that_is_no_occasion_is_answered_with_each_that_is_and_names_differ(load_with) -> None:
     with pytest.raises(FileError) as raised:
         load_with(ONE + 'on = ["fail"]\n')
     for word in get_args(OccasionWord):
         assert str(raised.value).count(f"'{word}'") == 1
     assert str(raised.value).count("alarm") == 1
-
-
-def test_names_differ(load_with) -> None:
     with pytest.raises(FileError, match="the same name"):
         load_with(ONE * 2)
 

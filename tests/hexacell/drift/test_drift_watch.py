@@ -37,16 +37,13 @@ def test_a_crash_is_found_the_same_night_and_the_watch_goes_on() -> None:
     assert second.change == pytest.approx(-20.0, abs=4 * second.sigma)
 
 
-def test_causes_that_the_runs_do_not_tell_apart_are_named_both() -> None:
+def test_causes_that_runs_do_not_tell_apart_and_another_leg_that_moved_are_named() -> None:
     robot, nearly_one = LinearRobot(), np.eye(6)
     nearly_one[1, :2] = [1.0, 1e-3]
     runs = list(robot.runs(30))
     robot.state[0] += 30.0
     (alarm,) = watch_runs([*runs, *robot.nights(3)], replace(CAUSES, by_state=nearly_one))[0]
     assert {alarm.cause, *(other for other, _ in alarm.or_causes)} == {0, 1}
-
-
-def test_another_leg_that_moved_as_well_is_named() -> None:
     robot = LinearRobot(5)
     runs = list(robot.runs(30))
     robot.state[[0, 5]] += [40.0, 25.0]

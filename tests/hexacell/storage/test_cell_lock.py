@@ -128,14 +128,11 @@ def test_cells_beside_each_other_are_held_apart_and_links_to_one_are_the_same(co
         assert is_busy(folder / ".." / "controller.toml")
 
 
-def test_a_write_back_does_not_open_the_lock(config: Path) -> None:
+def test_a_write_back_does_not_open_the_lock_whose_file_stays_and_is_empty_when_free(config: Path) -> None:
     with cell_lock(config):
         config.with_name("new").write_text("new")
         config.with_name("new").replace(config)
         assert is_busy(config)
-
-
-def test_the_lock_file_stays_and_is_empty_when_the_cell_is_free(config: Path) -> None:
     path = lock_path(config)
     with cell_lock(config):
         assert str(os.getpid()) in path.read_text()

@@ -95,7 +95,7 @@ def forecast(passed: float, part: str = NOISE, *, position: float = 0.2, orienta
     return VerdictForecast(probabilities, limits, passing, part, 0.064, 0.072)
 
 
-def test_limits_that_good_machines_fail_are_warned_of_with_what_would_do() -> None:
+def test_limits_that_good_machines_fail_are_warned_of_with_what_would_do_or_how_many_records() -> None:
     first, warning = verdict_forecast_lines(forecast(0.62, "scale of each encoder", position=0.2031), 55)
     assert "probability of 62% (conditional pass 38%)" in first
     assert "95% would pass position_mm = 0.21 in [acceptance]. The largest part" in warning
@@ -107,12 +107,9 @@ def test_limits_that_good_machines_fail_are_warned_of_with_what_would_do() -> No
     ):
         _, warning = verdict_forecast_lines(forecast(0.5, position=position, orientation=orientation), 55)
         assert said in warning
-
-
-def test_where_records_would_do_it_says_how_many() -> None:
-    """The part of the noise falls with the root of their number, what it is compared with does not."""
     _, warning = verdict_forecast_lines(forecast(0.5), 55)
     assert "about 124 records instead of 55" in warning
+    # The part of the noise falls with the root of their number, what it is compared with does not.
     expected = np.hypot(0.064 * (55 / 124) ** 0.5, 0.033)
     assert expected == pytest.approx(0.15 / 0.2 * 0.072, rel=0.02)
 

@@ -66,14 +66,11 @@ async def test_a_person_is_asked_for_each(startup) -> None:
     ]
 
 
-async def test_a_person_who_declines_ends_the_run(startup) -> None:
+async def test_a_person_who_declines_ends_the_run_and_a_later_emergency_stop_needs_one(startup) -> None:
     starting, bench = startup(NOTHING, Approver(startup=["no"]), [StartupAction.HOME])
     with pytest.raises(Interruption, match="is not homed, which was left as it is"):
         await starting.prepare(NEW)
     assert bench.controller.log == ["prepare"]
-
-
-async def test_a_later_emergency_stop_needs_a_person_whatever_the_cell_file_states(startup) -> None:
     starting, bench = startup(EVERYTHING, UnattendedOperator(), [StartupAction.RESET_ESTOP])
     with pytest.raises(AnswerNeeded, match="reset it at the controller, then begin or resume"):
         await starting.prepare(NEW)

@@ -120,15 +120,12 @@ async def test_a_failed_move_is_reported_as_the_trip_of_the_guard_with_its_cause
     assert isinstance(tripped.value.__cause__, DeviceError)
 
 
-async def test_a_move_that_fails_without_a_trip_raises_its_own_error(stage) -> None:
+async def test_a_move_that_fails_without_a_trip_or_by_a_programming_error_raises_that_error(stage) -> None:
     stage.controller.failures["move"] = DeviceError("cannot go there", subject="controller")
     with pytest.raises(DeviceError, match="cannot go there") as failed:
         await stage.do(move(2))
     assert not isinstance(failed.value, GuardTripped)
     await stage.do(move(2))
-
-
-async def test_a_programming_error_in_the_guards_ends_the_move(stage) -> None:
     stage.active_reason = AsyncMock(side_effect=ZeroDivisionError)
     with pytest.raises(ZeroDivisionError):
         await stage.do(move(2))

@@ -1,4 +1,4 @@
-"""The real driver against the simulated bank: inside one process, over a pty, over a socket."""
+"""Simulated encoders: seen on the wire without the driver, and by the real one over pty and socket."""
 
 import asyncio
 from functools import partial
@@ -9,6 +9,7 @@ from drivers.errors import BusError
 from drivers.simulated.encoders.object_dictionary import EVENTS_AND_SYNC
 from drivers.simulated.serial_line import PtyLine, SocketLine
 from drivers.simulated.slcan import SlcanServer
+from hexacell.clock import CellClock
 from tests.drivers.simulated.encoders.conftest import EVENTS_ONLY, TWO_MAGNETS
 from tests.waiting import until
 
@@ -60,3 +61,51 @@ async def test_an_adapter_that_is_closed(make_bank, driver, samples, line, readi
         waiting = asyncio.ensure_future(bank.read())
     with pytest.raises(BusError, match=r"encoder bus slcan .*CAN adapter"):
         await waiting
+
+
+START, STOP, PRE_OPERATIONAL, RESET, RESET_COMMUNICATION = 1, 2, 0x80, 0x81, 0x82
+SYNC, NMT = 0x80, 0
+
+
+@pytest.mark.parametrize("command", [STOP, PRE_OPERATIONAL, RESET, RESET_COMMUNICATION])
+def test_positions_are_sent_only_while_operational(make_bank, listen, command):
+    ear = listen(make_bank())
+    ear.send(NMT, START, 3)
+    ear.send(SYNC)
+    ear.wait_for(0x283)
+    ear.send(NMT, command, 3)
+    ear.heard()
+    ear.send(SYNC)
+    assert ear.heard() == []
+
+
+def test_a_reset_restores_the_vendors_defaults(make_bank, listen):
+    clock = CellClock()
+    ear = listen(make_bank(clock=clock))
+    begun_s = clock.now()
+    assert ear.sdo(1, "2b17100032") == "6017100000000000"
+    assert {ear.next() for _ in range(4)} == {(0x701, "7f")}
+    assert clock.now() - begun_s >= 4 * 0.05
+    ear.send(NMT, RESET, 1)
+    assert ear.wait_for(0x701) in ("7f", "00")
+    ear.heard()
+    assert ear.silence()
+    assert ear.sdo(1, "40171000") == "4b17100000000000"
+
+
+@pytest.mark.parametrize(
+    ("before", "request_", "code"),
+    [
+        ([], "2300180182010000", 0x06090030),  # another COB-ID while the PDO is on
+        ([], "2f001a0000", 0x08000022),  # mapping while the PDO is on
+        (["2300180181010080"], "23001a0120000460", 0x08000022),  # an entry while the mapping is valid
+        ([], "2300100000000000", 0x06010002),  # the device type
+    ],
+)
+def test_changes_of_pdos_against_the_rules_are_refused(make_bank, listen, before, request_, code):
+    ear = listen(make_bank())
+    for each in before:
+        assert ear.sdo(1, each).startswith("60")
+    answer = ear.sdo(1, request_)
+    assert answer[:2] == "80"
+    assert int.from_bytes(bytes.fromhex(answer[8:]), "little") == code

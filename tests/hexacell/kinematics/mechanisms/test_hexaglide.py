@@ -83,14 +83,11 @@ def directions_of_rails(turns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return axes.axis, axes.by_turns[2]
 
 
-def test_rail_1_and_slider_3_are_the_base_frame() -> None:
+def test_rail_1_and_slider_3_are_the_base_frame_unless_rails_oppose_or_coincide() -> None:
     normal, _ = MECHANISM.normalize_frames(six_rails_geometry(**machine()))
     np.testing.assert_array_equal(normal["S"][0], 0.0)
     np.testing.assert_array_equal(normal["rail"][0], 0.0)
     assert normal["S"][2, 1] == 0.0 < normal["S"][2, 0]
-
-
-def test_rails_the_opposite_way_and_sliders_on_one_rail_fix_no_frame() -> None:
     numbers = machine()
     numbers["rail"][4] = turns_of(-directions_of_rails(numbers["rail"][0])[0])
     with pytest.raises(UsageError, match="a slider counts the opposite way of slider 1"):

@@ -56,11 +56,16 @@ def test_a_file_that_others_can_read_or_change_is_refused(tmp_path, mode) -> Non
         resolve(tmp_path, url="https://x/", password_file=name)
 
 
-def test_a_mistake_in_the_file_does_not_show_it(tmp_path) -> None:
+def test_neither_a_mistake_in_the_file_nor_a_masked_text_shows_a_secret(tmp_path) -> None:
     name = private_file(tmp_path, 'url = 5\npasword = "hidden"\n')
     with pytest.raises(Exception, match=r"url|pasword") as raised:
         resolve(tmp_path, password_file=name)
     assert "hidden" not in str(raised.value)
+    found = resolve(tmp_path, {"HEXACELL_NOTIFY_NIGHT_SHIFT_URL": CHAT})
+    assert "hidden" not in repr(found)
+    said = f"could not reach {CHAT}: hidden-b was refused; and hidden-d too"
+    assert "hidden" not in found.masked(said)
+    assert "was refused" in found.masked(said)
 
 
 def test_nothing_to_send_to(tmp_path) -> None:
@@ -68,14 +73,6 @@ def test_nothing_to_send_to(tmp_path) -> None:
         resolve(tmp_path)
     with pytest.raises(UsageError, match="control characters"):
         resolve(tmp_path, {"HEXACELL_NOTIFY_NIGHT_SHIFT_URL": "https://\n"})
-
-
-def test_no_part_of_a_secret_is_shown(tmp_path) -> None:
-    found = resolve(tmp_path, {"HEXACELL_NOTIFY_NIGHT_SHIFT_URL": CHAT})
-    assert "hidden" not in repr(found)
-    said = f"could not reach {CHAT}: hidden-b was refused; and hidden-d too"
-    assert "hidden" not in found.masked(said)
-    assert "was refused" in found.masked(said)
 
 
 @pytest.mark.parametrize(

@@ -15,16 +15,13 @@ def at(port: int, **further):
     return an_address(f"mqtt://127.0.0.1:{port}", **further)
 
 
-def test_the_last_notice_is_the_retained_state() -> None:
+def test_the_last_notice_is_the_retained_state_and_a_test_leaves_it_alone() -> None:
     with broker() as server:
         for number in (1, 2):
             deliver(at(server.port), a_notice(number))
     assert len(server.published) == 2
     assert list(server.retained) == ["hexacell/cell 1/state"]
     assert Notice.model_validate_json(server.retained["hexacell/cell 1/state"]) == a_notice(2)
-
-
-def test_a_test_leaves_the_state_alone() -> None:
     with broker() as server:
         deliver(at(server.port), a_notice(occasions=(Occasion.TEST,)))
     ((topic, _, is_retained),) = server.published

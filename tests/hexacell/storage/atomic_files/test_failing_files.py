@@ -181,16 +181,13 @@ def test_temporaries_in_a_read_only_folder_are_left(ordinary_folder: Path, died:
     assert len(names(ordinary_folder)) == 1
 
 
-def test_read_if_present(path: Path, tmp_path: Path) -> None:
+def test_files_are_read_if_present_and_text_keeps_its_line_ends(path: Path, tmp_path: Path) -> None:
     assert atomic_files.read_if_present(path) == b"old"
     assert atomic_files.read_if_present(tmp_path / "absent") is None
     with pytest.raises(FileError, match="not a file"):
         atomic_files.read_if_present(tmp_path)
     with pytest.raises(FileError, match="a part of the path is not a folder"):
         atomic_files.read_if_present(path / "below")
-
-
-def test_text_keeps_its_line_ends_and_the_error_has_the_line_that_is_not_utf8(tmp_path: Path) -> None:
     path = tmp_path / "text"
     path.write_bytes(b"\xef\xbb\xbfa\r\nb\n")
     assert atomic_files.read_text(path) == "a\r\nb\n"

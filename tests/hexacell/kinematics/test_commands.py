@@ -16,7 +16,7 @@ def robot(hexaglide, paper):
     return CommandedRobot(hexaglide, paper.branch, paper.nominal, paper.actual)
 
 
-def test_the_actual_pose_closes_the_actual_geometry_at_the_joints_of_the_command(robot, hexaglide, paper):
+def test_the_actual_pose_closes_the_geometry_and_leads_back_to_its_command(robot, hexaglide, paper) -> None:
     actual = robot.actual_poses(COMMANDS)
     np.testing.assert_array_equal(actual.found, [True, True, False])
     np.testing.assert_array_equal(actual.joints[:2], robot.joints(COMMANDS)[:2])
@@ -24,9 +24,6 @@ def test_the_actual_pose_closes_the_actual_geometry_at_the_joints_of_the_command
     open_by = hexaglide.residual_and_jacobian(paper.actual, actual.poses[:2], actual.joints[:2])[0]
     assert np.abs(open_by).max() < 1e-9
     assert np.abs(actual.poses.positions[:2] - COMMANDS.positions[:2]).max() > 1.0
-
-
-def test_the_command_computed_for_an_actual_pose_is_the_original_command(robot):
     actual = robot.actual_poses(COMMANDS[:2])
     commands = robot.commands_for(actual.poses, actual.joints)
     assert commands.found.all()

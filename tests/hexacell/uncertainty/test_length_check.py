@@ -148,15 +148,12 @@ def noisy_check(laboratory, found, paper, fixture, seed=3) -> LengthCheck:
     return LengthCheck.of(records, fixture.standard(), NOISE, judged(found))
 
 
-def test_a_good_check_agrees_with_itself(laboratory, exact, paper) -> None:
+def test_a_good_check_agrees_with_itself_and_its_residuals_are_as_tested(laboratory, exact, paper) -> None:
     check = noisy_check(laboratory, exact, paper, seats(seating_mm=0.004))
     assert check.agreement.is_explained
     assert np.abs(check.closure_mm).max() < 0.06
     for followed in check.following().values():
         assert followed == pytest.approx([1.0, 1.0, 1.0], abs=0.2)
-
-
-def test_its_residuals_have_the_distribution_that_they_are_tested_by(laboratory, exact, paper) -> None:
     fixture = seats("oblique", seating_mm=0.004)
     chances = [noisy_check(laboratory, exact, paper, fixture, n).agreement.probability for n in range(40)]
     assert 0.35 < np.mean(chances) < 0.65
@@ -180,7 +177,7 @@ def test_gauges_the_wrong_way_round_run_against_the_ball(laboratory, exact, pape
     assert all((followed[mounting] > 0.8).all() for mounting in (1, 3))
 
 
-def test_gauges_whose_ball_never_moved_say_nothing_of_their_direction(laboratory, exact, paper) -> None:
+def test_a_ball_that_never_moved_says_nothing_and_other_joints_are_refused(laboratory, exact, paper):
     records = seats().records(laboratory, exact, ideal(paper))
     placement = records.placement
     kept = np.flatnonzero(np.abs(placement.deviations).max(axis=1) < 0.1)
@@ -188,10 +185,6 @@ def test_gauges_whose_ball_never_moved_say_nothing_of_their_direction(laboratory
     still = LengthRecords(records.mountings[kept], replace(placement, **rows))
     followed = LengthCheck.of(still, seats().standard(), NOISE, judged(exact)).following()
     assert all(np.isnan(one).all() for one in followed.values())
-
-
-def test_joint_variables_of_other_poses_are_refused(laboratory, exact, paper) -> None:
-    records = seats().records(laboratory, exact, ideal(paper))
     wrong = replace(records.placement, joints=records.placement.joints * [1, -1, 1, -1, 1, -1])
     with pytest.raises(IdentifiabilityError, match="do not belong to the commanded poses"):
         LengthRecords.of(wrong, records.mountings)

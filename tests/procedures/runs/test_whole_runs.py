@@ -29,7 +29,7 @@ def test_a_whole_run_passes(recording) -> None:
     assert recording.controller_log.count("reload") == 1
 
 
-def test_the_written_geometry_agrees_with_the_true_one_within_five_sigma(recording, tmp_path) -> None:
+def test_the_written_geometry_is_the_true_one_in_frames_near_those_of_before(recording, tmp_path) -> None:
     config = tmp_path / "after.toml"
     config.write_bytes(recording.config_after)
     written = native_layout(HEXAGLIDE_PARAMETERS).read(config).geometry
@@ -39,13 +39,7 @@ def test_the_written_geometry_agrees_with_the_true_one_within_five_sigma(recordi
     sigma = np.sqrt(np.diag(identified.result.estimate(HEXAGLIDE_PARAMETERS).covariance))
     assert np.abs(found - expected)[sigma > 0.0].max() > 0.0
     assert (np.abs(found - expected) <= 5.0 * sigma + 1e-6).all()
-
-
-def test_the_config_has_the_geometry_that_was_proposed_in_frames_near_those_of_before(recording, tmp_path):
-    """The journal has it, and says how far it moves what was taught."""
-    config = tmp_path / "after.toml"
-    config.write_bytes(recording.config_after)
-    written = native_layout(HEXAGLIDE_PARAMETERS).read(config).geometry
+    # The journal has it, and says how far it moves what was taught.
     state = fold(recording.history)
     assert state.started is not None
     assert state.started.taught == state.started.controller

@@ -210,16 +210,13 @@ async def test_an_inch_machine_is_commanded_in_mm_and_what_it_tells_is_converted
     assert reported.pose.as_tuple() == pytest.approx(wire.TARGET.as_tuple(), abs=2e-5)
 
 
-async def test_the_modes_that_a_stopped_move_leaves_are_restored_by_the_next_preparation(play):
+async def test_the_modes_that_a_stopped_move_leaves_are_restored_by_preparing_or_closing(play) -> None:
     play.patience = play.IMPATIENT
     driver = await play.opened([*READY, *CHECKED, *wire.REFUSED, *STATE, *READY, RESTORED_HERE, *CHECKED])
     await driver.prepare(frozenset())
     with pytest.raises(MoveRefused):
         await driver.move(wire.TARGET, wire.MOVE_S)
     await driver.prepare(frozenset())
-
-
-async def test_the_modes_that_a_stopped_move_leaves_are_restored_on_closing(play):
     driver = await play.opened([*READY, *CHECKED, *wire.REFUSED, *STATE, RESTORED_HERE])
     await driver.prepare(frozenset())
     with pytest.raises(MoveRefused):

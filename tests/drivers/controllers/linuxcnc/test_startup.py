@@ -141,18 +141,12 @@ FALSE_COORDINATES = pytest.mark.parametrize(
 
 
 @FALSE_COORDINATES
-async def test_settings_that_falsify_coordinates_are_refused_and_then_nothing_moves(
-    play, conversation, problem
-):
+async def test_settings_that_falsify_coordinates_are_found_at_once(play, conversation, problem) -> None:
     driver = await play.opened([*UNTIL_MDI, *conversation])
     with pytest.raises(DeviceError, match=problem):
         await driver.prepare(ALL)
     with pytest.raises(MoveRefused, match=r"its last preparation failed\. Prepare it again"):
         await driver.move(Pose(0.0, 0.0, 500.0), 1.0)
-
-
-@FALSE_COORDINATES
-async def test_a_check_finds_them_and_sets_nothing(play, conversation, problem):
     driver = await play.opened(conversation)
     with pytest.raises(DeviceError, match=problem):
         await driver.check()

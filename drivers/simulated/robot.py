@@ -22,9 +22,6 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.motion.trajectory import interpolate_line
 
-STEP = 1e-4
-"""Step of differences, in the joints' unit."""
-
 ROUNDS = 4
 """Steps of Newton's method, for joints a little off the inverse kinematics."""
 
@@ -57,14 +54,10 @@ def _under_load(
     forces = leg_tensions(mechanism, geometry, poses, joints, newton)
     by_force = UM * np.array(stated.compliance_um_n) * stated.weight_n
     longer = 0.5 * np.array(stated.play_mm) * np.sign(forces) + by_force * forces
-
-    def lengths(at: Array) -> Array:
-        return mechanism.residual_and_jacobian(geometry, poses, at)[0]
-
     sent = joints
     for _ in range(ROUNDS):
-        slope = lengths(sent + STEP) - lengths(sent - STEP)
-        sent = sent - (lengths(sent) - longer) * 2.0 * STEP / slope
+        excess = mechanism.residual_and_jacobian(geometry, poses, sent)[0] - longer
+        sent = sent - excess / mechanism.derivatives(geometry, poses, sent).joints
     return sent
 
 

@@ -7,15 +7,9 @@ from dataclasses import dataclass
 
 from canopen.emcy import EmcyError
 
+from drivers.encoders import object_dictionary as od
 from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode, Leg, silent_nodes, subject_of
-from drivers.encoders.object_dictionary import (
-    ALARMS,
-    ERROR_REGISTER,
-    PRODUCER_HEARTBEAT,
-    WARNINGS,
-    ObjectEntry,
-)
 from drivers.errors import RestartedNodeError, invalid_sample
 
 HEARTBEAT = 0x700
@@ -54,11 +48,11 @@ _ACTIONS = {
     "s": "State a lower speed in [speed], then measure again",
 }
 """By how the code of an emergency begins (CiA 301, table of error codes), and by what bits mean."""
-_BITS = {ERROR_REGISTER: "-234", ALARMS: "m", WARNINGS: "sm6ob"}
+_BITS = {od.ERROR_REGISTER: "-234", od.ALARMS: "m", od.WARNINGS: "sm6ob"}
 """What the bits of an entry mean, from the lowest (CiA 301, CiA 406); others are their makers'."""
 
 
-def advice_for(entry: ObjectEntry, value: int, code: str = "") -> str:
+def advice_for(entry: od.ObjectEntry, value: int, code: str = "") -> str:
     """What to do, by the code of an emergency, or else by the lowest bit that has a known meaning."""
     keys = [code, code[:2], code[:1], *(key for bit, key in enumerate(_BITS[entry]) if value >> bit & 1)]
     unknown = "Look up what it means in the encoder's manual, and remove that; then measure again"
@@ -101,14 +95,16 @@ class NodeMonitor:
         Gives what a person should know: some nodes send none, only answer to guarding (CiA 301, 100Ch), or
         do not keep the setting. Their silence is a missing response to SYNC.
         """
-        setting = node.read_optional(PRODUCER_HEARTBEAT)
+        setting = node.read_optional(od.PRODUCER_HEARTBEAT)
         if setting or (setting is not None and self._heartbeat_ms):
-            node.write(PRODUCER_HEARTBEAT, self._heartbeat_ms)
-            setting = node.read(PRODUCER_HEARTBEAT)
+            node.write(od.PRODUCER_HEARTBEAT, self._heartbeat_ms)
+            setting = node.read(od.PRODUCER_HEARTBEAT)
         if self._heartbeat_ms and setting:
             self._last_heartbeat = time.monotonic()
         elif self._heartbeat_ms:
-            return f"it does not send a heartbeat ({PRODUCER_HEARTBEAT}): its silence is seen at a sample"
+            return (
+                f"it does not send a heartbeat ({od.PRODUCER_HEARTBEAT}): its silence is seen at a sample"
+            )
         return ""
 
     def _on_heartbeat(self, _can_id: int, data: bytearray, _timestamp: float) -> None:
@@ -131,7 +127,7 @@ class NodeMonitor:
         self.emergencies += 1
         words = _KNOWN_EMERGENCIES.get(code) or EmcyError(code, register, b"", 0.0).get_desc().lower()
         self.emergency = f"emergency {code:04X} ({words}, error register {register:#04x})"
-        self.action = advice_for(ERROR_REGISTER, register if len(data) > 2 else 0, f"{code:04X}")
+        self.action = advice_for(od.ERROR_REGISTER, register if len(data) > 2 else 0, f"{code:04X}")
         self._condition.notify_all()
 
 
@@ -178,11 +174,11 @@ class AlarmPoll:
         self._entries = [
             (node, entry)
             for node in self.nodes
-            for entry in (ERROR_REGISTER, ALARMS, WARNINGS)
+            for entry in (od.ERROR_REGISTER, od.ALARMS, od.WARNINGS)
             if node.read_optional(entry) is not None
         ]
         # A warning that is there at the opening is a remark then, and need not end every run.
-        self._known = {(node, one): node.read(one) for node, one in self._entries if one is WARNINGS}
+        self._known = {(node, one): node.read(one) for node, one in self._entries if one is od.WARNINGS}
         self.begin_sample()
         self.check()
 
@@ -206,13 +202,13 @@ class AlarmPoll:
         self._polls += 1
         self._emergencies_seen = -1  # due again at once, should one be found
         for node, entry in self._entries:
-            if entry is WARNINGS and self._polls % WARNINGS_EVERY != 0:
+            if entry is od.WARNINGS and self._polls % WARNINGS_EVERY != 0:
                 continue
             value = node.read(entry)
-            if entry is ERROR_REGISTER:
+            if entry is od.ERROR_REGISTER:
                 value &= ~_COMMUNICATION
             if found := value & ~self._known.get((node, entry), 0):
-                word = "a warning" if entry is WARNINGS else "an alarm"
+                word = "a warning" if entry is od.WARNINGS else "an alarm"
                 action = advice_for(entry, found)
                 raise invalid_sample(f"has {word} ({entry} is {value:#06x})", node.leg.subject, action)
         self._emergencies_seen = emergencies

@@ -14,11 +14,7 @@ from procedures.run.keys import SixNumbers
 from procedures.run.readings import Reading
 
 if TYPE_CHECKING:  # a set keeps events whole, and needs their names in its annotations alone
-    from procedures.steps.pilot import PilotTaken
-    from procedures.steps.probe import GaugesProbed
-    from procedures.steps.repeat import ReferenceRepeated
-    from procedures.steps.sample import RecordTaken
-    from procedures.steps.standstill import StandstillRead
+    from procedures.steps import events
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +36,7 @@ class SetState:
             the gauges are unwatched.
     """
 
-    samples: tuple[RecordTaken, ...] = ()
+    samples: tuple[events.RecordTaken, ...] = ()
     placed: bool = False
     rejections: int = 0
     drift_mm: tuple[float, float, float] | None = None
@@ -49,12 +45,12 @@ class SetState:
     walk_s: float = 0.0
     again: tuple[tuple[int, SixNumbers], ...] = ()
     reference_unverified: bool = False
-    standstill: StandstillRead | None = None
-    visits: tuple[ReferenceRepeated, ...] = ()
+    standstill: events.StandstillRead | None = None
+    visits: tuple[events.ReferenceRepeated, ...] = ()
     has_left: bool = False
-    pilots: tuple[PilotTaken, ...] = ()
+    pilots: tuple[events.PilotTaken, ...] = ()
     piloted: int = 0
-    probes: tuple[GaugesProbed, ...] = ()
+    probes: tuple[events.GaugesProbed, ...] = ()
     tried: bool = False
 
     @property

@@ -22,19 +22,9 @@ from procedures.run.set_state import SetState
 if TYPE_CHECKING:  # a state keeps events whole, and needs their names in its annotations alone
     from hexacell.checks.change_alarm import ChangeAlarm
     from hexacell.verdict.decision import Verdict, VerifiedAccuracy
-    from procedures.steps.accept import ResultAccepted
-    from procedures.steps.assess_noise import NoiseMeasured
-    from procedures.steps.base import BaseEvent, BaseStep
-    from procedures.steps.commit import Committed
-    from procedures.steps.events import Ended, RunStarted
-    from procedures.steps.identify import Identified
-    from procedures.steps.judge import ConfirmationPlanned, ResultValidated
-    from procedures.steps.lend import ProvisionalApplied
-    from procedures.steps.move import PoseExcluded
-    from procedures.steps.propose import Proposed
-    from procedures.steps.sample import RecordTaken
+    from procedures.steps import events
 
-EventT = TypeVar("EventT", bound="BaseEvent")
+EventT = TypeVar("EventT", bound="events.BaseEvent")
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +53,7 @@ class RunState:
         others: the last event of each class that has no field here.
     """
 
-    started: RunStarted | None = None
+    started: events.RunStarted | None = None
     sets: dict[SetKey, SetState] = field(default_factory=dict)
     at_pose: tuple[SetKey, int] | None = None
     target: SixNumbers | None = None
@@ -72,24 +62,24 @@ class RunState:
     path_from_reference: tuple[tuple[int, SixNumbers], ...] = ()
     position_unknown: bool = False
     invalidated: int = 0
-    noise: NoiseMeasured | None = None
-    identified: Identified | None = None
-    proposed: Proposed | None = None
-    committed: Committed | None = None
-    confirmation: ConfirmationPlanned | None = None
-    judged: ResultValidated | None = None
-    accepted: ResultAccepted | None = None
+    noise: events.NoiseMeasured | None = None
+    identified: events.Identified | None = None
+    proposed: events.Proposed | None = None
+    committed: events.Committed | None = None
+    confirmation: events.ConfirmationPlanned | None = None
+    judged: events.ResultValidated | None = None
+    accepted: events.ResultAccepted | None = None
     rolled_back: bool = False
     rolling_back: bool = False
-    provisional: ProvisionalApplied | None = None
+    provisional: events.ProvisionalApplied | None = None
     provisional_active: bool = False
     config_write_pending: bool = False
-    excluded: tuple[PoseExcluded, ...] = ()
+    excluded: tuple[events.PoseExcluded, ...] = ()
     failures: dict[tuple[FailureKind, str], int] = field(default_factory=dict)
     is_in_estop: bool = False
     recalled: str | None = None
-    ended: Ended | None = None
-    others: Mapping[type[BaseEvent], BaseEvent] = field(default_factory=dict)
+    ended: events.Ended | None = None
+    others: Mapping[type[events.BaseEvent], events.BaseEvent] = field(default_factory=dict)
 
     def latest(self, kind: type[EventT]) -> EventT | None:
         """The last event of a class that has no field here; None if there was none."""
@@ -134,7 +124,7 @@ class RunState:
         """Number of records and closed sets, of which a run is made."""
         return sum(len(measured.samples) + measured.closed for measured in self.sets.values())
 
-    def attempts(self, kind: FailureKind, step: BaseStep | None) -> int:
+    def attempts(self, kind: FailureKind, step: events.BaseStep | None) -> int:
         """How often a step, or another one of its set, failed in this way."""
         return self.failures.get((kind, place_of(step)), 0)
 
@@ -175,7 +165,7 @@ class RunState:
         zero = self.zero(key)
         return None if zero is None else zero.gauges_mm
 
-    def samples(self, phase: Phase) -> tuple[RecordTaken, ...]:
+    def samples(self, phase: Phase) -> tuple[events.RecordTaken, ...]:
         """All records of a phase, in the order of their points."""
         keys = sorted((key for key in self.sets if key.phase is phase), key=lambda key: key.point)
         return tuple(sample for key in keys for sample in self.sets[key].samples)
@@ -263,16 +253,16 @@ class RunState:
         return [sample.deviation_mm for sample in compared]
 
 
-def fold(history: Iterable[BaseEvent]) -> RunState:
+def fold(history: Iterable[events.BaseEvent]) -> RunState:
     """The state after these events."""
     return reduce(apply, history, RunState())
 
 
-def apply(state: RunState, event: BaseEvent) -> RunState:
+def apply(state: RunState, event: events.BaseEvent) -> RunState:
     """The state after one more event."""
     return event.applied_to(state)
 
 
-def place_of(step: BaseStep | None) -> str:
+def place_of(step: events.BaseStep | None) -> str:
     """Where failures are counted: the set of a step, or the key of a step that belongs to none."""
     return "deciding" if step is None else step.place

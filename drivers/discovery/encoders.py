@@ -8,6 +8,7 @@ before anything is set.
 
 import re
 import threading
+from collections import Counter
 from collections.abc import Collection, Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass
@@ -86,37 +87,32 @@ class BusFindings:
     problem: str = ""
 
 
-@dataclass(slots=True)
-class _Heard:
-    latest: bytes
-    count: int = 0
-    changes: bool = False
-
-
 class OverheardFrames:
     """What a bus says while it is only listened to: a filter of an :class:`EncoderBus`, which keeps it."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._heard: dict[tuple[int, bool], _Heard] = {}
+        self._latest: dict[tuple[int, bool], bytes] = {}
+        self._counts = Counter[tuple[int, bool]]()
+        self._changing = set[tuple[int, bool]]()
 
     def accepts(self, message: can.Message) -> bool:
         """Keep a frame; whether it is one for a CANopen network."""
         if message.is_rx and not message.is_remote_frame:
             key, data = (message.arbitration_id, message.is_extended_id), bytes(message.data)
             with self._lock:
-                if key in self._heard or len(self._heard) < MAX_IDENTIFIERS:
-                    one = self._heard.setdefault(key, _Heard(data))
-                    one.changes = one.changes or data != one.latest
-                    one.latest, one.count = data, one.count + 1
+                if key in self._latest or len(self._latest) < MAX_IDENTIFIERS:
+                    self._changing |= {key} if self._latest.get(key, data) != data else set()
+                    self._latest[key] = data
+                    self._counts[key] += 1
         return is_canopen(message)
 
     def counted(self, seconds: float) -> tuple[FoundFrame, ...]:
         """The frames that were heard until now, in ``seconds``, by identifier."""
         with self._lock:
             return tuple(
-                FoundFrame(number, is_extended, len(one.latest), one.count / seconds, one.changes)
-                for (number, is_extended), one in sorted(self._heard.items())
+                FoundFrame(*key, len(data), self._counts[key] / seconds, key in self._changing)
+                for key, data in sorted(self._latest.items())
             )
 
 

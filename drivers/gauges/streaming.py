@@ -9,9 +9,8 @@ from enum import Enum, auto
 from typing import ClassVar
 
 from drivers.errors import EmptyChannel, GaugeSilent, WrongAnswer
-from drivers.gauges.protocol import FrameRejected
+from drivers.gauges.protocol import FrameRejected, GaugeState
 from drivers.gauges.serial_gauge import ValueOnlyGauge
-from drivers.interfaces import GaugeReading
 from drivers.serial.opening import SLICE_S
 from drivers.serial.received import SHOWN_BYTES, quoted
 from drivers.serial.shared_port import SharedSerialPorts
@@ -50,20 +49,11 @@ class StreamingGauge(ValueOnlyGauge):
     def _origin(self, frame: bytes) -> Origin:
         """Whose frame it is."""
 
-    async def read(self) -> GaugeReading:
-        """The displayed value, mm, as soon as readings agree that all came afterwards."""
+    def _opened_state(self) -> GaugeState:
+        """Every reading and every check begins here: what counts for it comes afterwards."""
+        state = super()._opened_state()
         self._begin()
-        return await super().read()
-
-    async def read_once(self) -> GaugeReading:
-        """The next value that was measured afterwards."""
-        self._begin()
-        return await super().read_once()
-
-    async def check(self) -> None:
-        """Compare what every value shows, unit and decimals, with what it was at ``open``."""
-        self._begin()
-        await super().check()
+        return state
 
     async def _connect(self) -> None:
         await super()._connect()

@@ -44,13 +44,8 @@ class LengthSteps:
         return tuple(
             (f"length check, seat {key.seat}, orientation {number}", self._pose(key, number, np.zeros(3)))
             for key in [SetKey(phase=Phase.LENGTH, point=mounting) for mounting in (1, 2)]
-            for number in range(1, self._records + 1)
+            for number in range(1, self.fixture.orientations + 2)
         )
-
-    @property
-    def _records(self) -> int:
-        """Number of records of a mounting."""
-        return self.fixture.orientations + 1
 
     def _in_set(self, state: RunState, key: SetKey) -> Step:
         measured = state.set(key)
@@ -63,7 +58,7 @@ class LengthSteps:
         zero = self.sets.known(state, key)[1]  # where the ball is with the gauges at zero
         if step := self.sets.due_first(state, key, zero):
             return step
-        if (orientation := measured.next_orientation) > self._records:
+        if (orientation := measured.next_orientation) > self.fixture.orientations + 1:
             return self.sets.at_or_to_reference(state, key, zero)
         samples = measured.samples  # where the seat is beside its stated place, by the first reading in it
         is_known = key.point != 1 and bool(samples)

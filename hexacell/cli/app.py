@@ -11,7 +11,7 @@ from importlib import import_module
 
 from hexacell import __version__
 from hexacell.cli.arguments import make_parser
-from hexacell.cli.arguments.commands import output_of
+from hexacell.cli.arguments.parser import output_of
 from hexacell.cli.console import Console, lost_output, unhindered_output
 from hexacell.cli.process import OVER_A_SOCKET, fault_line, log, require_platform, stop_signals_as_sigint
 from hexacell.errors import ExitCode, HexacellError, UsageError

@@ -3,8 +3,8 @@
 import argparse
 
 from hexacell import __version__
-from hexacell.cli.arguments.commands import Parser
-from hexacell.cli.arguments.every import COMMANDS
+from hexacell.cli.arguments.commands import COMMANDS
+from hexacell.cli.arguments.parser import Parser
 
 EXIT_CODES = """exit codes:
   0 done, within limits            4 an answer or approval is needed

@@ -1,114 +1,309 @@
-"""What the arguments of all commands are made of."""
+"""Arguments of the commands, in the order in which ``hexacell --help`` has them."""
 
-import argparse
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
-from hexacell.errors import UsageError
-from hexacell.storage.output_files import LOG, OutputFile, OutputKind
+from hexacell.cli.arguments.parser import (
+    LARGEST_NODE_ID,
+    MODES,
+    Parser,
+    add_command,
+    add_flag,
+    add_output,
+    add_parser,
+    add_value,
+    bounded_seconds,
+    whole_number,
+)
+from hexacell.storage.output_files import EVENTS, METRICS, NEW_CELL, REPORT, SERVED_CELL
 
-LARGEST_NODE_ID = 127
-LONGEST_S = 86_400.0
-MODES = ("check", "quick", "optimise")
-
-
-class Parser(argparse.ArgumentParser):
-    """A parser that raises instead of exiting, so that every error is reported in the same form.
-
-    Options cannot be abbreviated: an abbreviation that works today may be ambiguous tomorrow.
-    """
-
-    def __init__(self, **settings: Any) -> None:  # noqa: ANN401 - argparse's own settings
-        super().__init__(allow_abbrev=False, **settings)
-
-    def error(self, message: str) -> NoReturn:
-        """Raise ``UsageError`` with argparse's message."""
-        raise UsageError(message, action=f"Try `{self.prog} --help`")
-
-    def add_cell(self) -> None:
-        """Add the cell file."""
-        self.add_argument("cell", type=Path, metavar="CELL", help="the cell file (TOML)")
-
-    def add_run(self, what: str = "a run folder") -> None:
-        """Add the run."""
-        self.add_argument("run", type=Path, metavar="RUN", help=what)
-
-    def add_json(self) -> None:
-        """Add the choice of a JSON document."""
-        add_flag(self, "--json", "one JSON document on stdout; text goes to stderr")
-
-    def add_resume(self, what: str) -> None:
-        """Add the run to resume, the latest one by default."""
-        words = f"resume an interrupted {what}: its folder or name (default: the latest one)"
-        self.add_argument("--resume", metavar="RUN", nargs="?", const="latest", help=words)
+SHELLS = ("bash", "zsh", "fish")
 
 
-def add_flag(container: Any, option: str, what: str) -> None:  # noqa: ANN401 - a parser, or a group of one
-    """Add an option without a value."""
-    container.add_argument(option, action="store_true", help=what)
+def _demo(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
+    summary = "do the whole job on a simulated cell, nothing attached"
+    parser = add_command(commands, "demo", summary, "run.demo")
+    words = "one of the cells that come with hexacell"
+    add_value(parser, "--config", "NAME", words, default="simulated-hexaglide")
+    words = "where to work; an earlier demo there is replaced"
+    add_value(parser, "--folder", "FOLDER", words, Path, Path("hexacell-demo"))
+    parser.add_json()
 
 
-def add_value(
-    container: Any,  # noqa: ANN401 - a parser, or a group of one
-    option: str,
-    metavar: str,
-    what: str,
-    kind: Callable[[str], object] = str,
-    default: object = None,
-) -> None:
-    """Add an option with one value; a default that is not None is in the help too."""
-    shown = "" if default is None else " (default: %(default)s)"
-    container.add_argument(option, type=kind, default=default, metavar=metavar, help=f"{what}{shown}")
-
-
-def add_output(parser: Parser, option: str, kind: OutputKind, what: str) -> None:
-    """Add an option that names a file to be written, which only :class:`.OutputFile` opens."""
-    add_value(parser, option, "FILE", what, output_of(kind))
-
-
-def output_of(kind: OutputKind) -> Callable[[str], OutputFile]:
-    """The type of an argument: a file to be written."""
-    return lambda name: OutputFile(Path(name), kind)
-
-
-def add_parser(commands: Any, name: str, summary: str) -> Parser:  # noqa: ANN401 - argparse's own type is private
-    """Add a command, or one of a command, with a summary that is its description, too."""
-    parser: Parser = commands.add_parser(
-        name, help=summary, description=summary[0].upper() + summary[1:] + "."
+def _run(commands: Any) -> None:  # noqa: ANN401
+    parser = add_command(commands, "run", "measure, identify, propose, write back and verify")
+    parser.add_cell()
+    parser.add_resume("run")
+    add_flag(parser, "--unattended", "no person can place gauges or approve")
+    parser.add_argument(
+        "--mode",
+        choices=MODES,
+        help="check: measure until the error is decided, change nothing (default if unattended); "
+        "quick: carry a check on to the accuracy of the last calibration, and write back; "
+        "optimise: calibrate and write back (default otherwise)",
     )
-    # Suppressed defaults: the options of an action must not hide those given before its name.
-    words = "append to this file what the program does; with -v also the bytes on the lines"
-    kind = output_of(LOG)
-    parser.add_argument("--log-file", type=kind, default=argparse.SUPPRESS, metavar="FILE", help=words)
-    words = "log on stderr what the program does; twice: also the bytes on the lines"
-    parser.add_argument("-v", "--verbose", action="count", default=argparse.SUPPRESS, help=words)
-    return parser
+    add_flag(
+        parser,
+        "--length-check",
+        "check the length scale before the verdict, with the fixture of [length_check]; a resumed run "
+        "has it if it was begun with it",
+    )
+    add_output(parser, "--events", EVENTS, "write each event there, as a line of JSON, as it happens")
+    parser.add_json()
 
 
-def add_command(commands: Any, name: str, summary: str, target: str = "") -> Parser:  # noqa: ANN401
-    """Add a command; ``target`` is its module and function in ``hexacell.cli.commands``."""
-    parser = add_parser(commands, name, summary)
-    parser.set_defaults(target=target or f"{name}.main")
-    return parser
+def _tui(commands: Any) -> None:  # noqa: ANN401
+    add_command(commands, "tui", "the technician's screen: measure, review, approve, roll back").add_cell()
 
 
-def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:
-    """The type of an argument: a whole number from ``least`` to ``most``, if there is a largest one."""
-
-    def read(text: str) -> int:
-        number = int(text)
-        if number < least or (most is not None and number > most):
-            raise ValueError  # argparse makes a message of it
-        return number
-
-    read.__name__ = f"number from {least}{'' if most is None else f' to {most}'}"
-    return read
+def _length(commands: Any) -> None:  # noqa: ANN401
+    summary = "check the scale of the encoders against a known length"
+    parser = add_command(commands, "length", summary, "run.length")
+    parser.add_cell()
+    parser.add_resume("check")
+    add_flag(parser, "--unattended", "no person can mount the gauges")
+    parser.add_json()
 
 
-def bounded_seconds(text: str) -> float:
-    """Seconds, from above 0 to a day; raises ``ValueError``."""
-    seconds = float(text)
-    if not 0.0 < seconds <= LONGEST_S:
-        raise ValueError(text)
-    return seconds
+def _preflight(commands: Any) -> None:  # noqa: ANN401
+    summary = "check everything that must hold before motion; moves nothing"
+    parser = add_command(commands, "preflight", summary)
+    parser.add_cell()
+    add_flag(parser, "--unattended", "check also that no person is needed")
+    words = "of the run: a calibration (default), or the quick level from the last result on"
+    parser.add_argument("--mode", choices=MODES[1:], default="optimise", help=words)
+    parser.add_json()
+
+
+def _simulate(commands: Any) -> None:  # noqa: ANN401
+    summary = "serve a simulated cell to other processes until interrupted"
+    parser = add_command(commands, "simulate", summary, "serve.simulate")
+    parser.add_cell()
+    add_output(parser, "--output", SERVED_CELL, "write the cell file for `run` there instead of to stdout")
+
+
+def _host(commands: Any) -> None:  # noqa: ANN401
+    """The process of a run. People never type it, so the help does not list it."""
+    parser = commands.add_parser("host")
+    parser.set_defaults(target="host.main")
+    parser.add_cell()
+    parser.add_argument("--folder", type=Path, required=True)
+    parser.add_argument("--mode", choices=(*MODES, "length"), required=True)
+    parser.add_argument("--resume", action="store_true")
+    parser.add_argument("--length-check", action="store_true")
+
+
+def _next(commands: Any) -> None:  # noqa: ANN401
+    parser = add_command(commands, "next", "print the pose worth measuring next", "records.propose_next")
+    _add_measurements(parser, "the records so far (CSV)")
+    words = "how many poses at this point could not be measured; proposes another"
+    parser.add_argument("--refused", type=whole_number(0), default=0, metavar="N", help=words)
+    parser.add_json()
+
+
+def _fit(commands: Any) -> None:  # noqa: ANN401
+    parser = add_command(commands, "fit", "identify the geometry from a measurement file", "records.fit")
+    _add_measurements(parser, "the records (CSV)")
+    words = "all parameters, or the encoders' zeros alone (default: as the cell file says)"
+    parser.add_argument("--identify", choices=("all", "zeros"), help=words)
+    parser.add_json()
+
+
+def _add_measurements(parser: Parser, what: str) -> None:
+    parser.add_cell()
+    parser.add_argument("--measurements", type=Path, required=True, metavar="FILE", help=what)
+
+
+def _replay(commands: Any) -> None:  # noqa: ANN401
+    summary = "repeat a recorded run's decisions and results, and compare"
+    parser = add_command(commands, "replay", summary, "recorded.replay_run")
+    parser.add_run("a run folder, or a journal")
+    words = "repeat only these, and take everything else as recorded"
+    parser.add_argument("--only", choices=("decisions", "results", "identification"), help=words)
+    words = "allowed difference of a number, relative above 1 (default: 1e-9)"
+    add_value(parser, "--tolerance", "T", words, float)
+    words = "replay nothing; copy the run folder there with every password masked, to be given to others"
+    add_value(parser, "--export", "FOLDER", words, Path)
+    parser.add_json()
+
+
+_EACH_CASE = "of orientations and noise, for each case"
+STUDIES = (
+    ("paper", "figures 4 and 5 and table 2 of Abtahi et al. (2010)", _EACH_CASE),
+    ("experiment", "its experiment, figures 8 and 9, by the robot's repeatability", _EACH_CASE),
+    (
+        "design",
+        "accuracy by records, choice of orientations, travel, tilt, noise and points",
+        "robots, each measured in every way",
+    ),
+)
+"""Name, summary, and what is drawn; each is a row of ``hexacell.cli.commands.study``, slow to import."""
+
+
+def _studies(commands: Any) -> None:  # noqa: ANN401
+    parser = add_parser(commands, "study", "repeat what was published of the method, on simulated robots")
+    studies = parser.add_subparsers(title="studies", metavar="STUDY", required=True)
+    for name, summary, drawn in STUDIES:
+        study = add_command(studies, name, summary, target="study.main")
+        study.set_defaults(study=name)
+        add_value(study, "--draws", "N", drawn, whole_number(1), 20)
+        workers = study.add_mutually_exclusive_group()
+        words = "at a time (default: one for each processor)"
+        add_value(workers, "--processes", "N", words, whole_number(1))
+        words = "of a Dask cluster, tcp://HOST:PORT, instead of processes"
+        add_value(workers, "--scheduler", "ADDRESS", words)
+        words = "keeps each result, so that a study can be interrupted, and gets a picture"
+        add_value(study, "--folder", "FOLDER", words, Path, Path("hexacell-study"))
+        study.add_json()
+
+
+def _devices(commands: Any) -> None:  # noqa: ANN401
+    parser = add_command(commands, "devices", "find gauges, encoders, a controller; text for a cell file")
+    words = "serial ports or URLs (default: all of this computer)"
+    parser.add_argument("ports", nargs="*", metavar="PORT", help=words)
+    words = "a CAN bus, such as interface=slcan,channel=/dev/ttyACM0,bitrate=500000"
+    parser.add_argument("--can", action="append", default=[], metavar="BUS", help=words)
+    add_value(
+        parser, "--controller", "HOST:PORT", "where LinuxCNC's server may be", default="127.0.0.1:5007"
+    )
+    words = "give the only device on a CAN bus this node id (LSS), after a question"
+    add_value(parser, "--set-node", "ID", words, whole_number(1, LARGEST_NODE_ID))
+    add_output(parser, "--write", NEW_CELL, "write a cell file: what was found, and your answers")
+    add_value(parser, "--diagnose", "NAME", "watch a gauge, or encoders, of --cell")
+    add_value(parser, "--cell", "CELL", "the cell file (TOML) of --diagnose", Path)
+    add_value(parser, "--seconds", "S", "how long --diagnose watches", bounded_seconds, 10.0)
+    parser.add_json()
+
+
+def _schedule(commands: Any) -> None:  # noqa: ANN401
+    summary = "have a cell checked each day, by units of systemd"
+    parser = add_command(commands, "schedule", summary, "unattended.schedule")
+    parser.add_cell()
+    what = parser.add_mutually_exclusive_group()
+    add_value(what, "--daily", "HH:MM", "write the units: a run each day at this time")
+    add_flag(what, "--show", "show the units of this cell")
+    add_flag(what, "--remove", "remove them")
+    parser.add_argument(
+        "--mode",
+        choices=MODES,
+        default="check",
+        help="check: change nothing (default); quick: correct what has drifted, optimise: recalibrate, "
+        "and apply only within the limits",
+    )
+    add_output(parser, "--metrics", METRICS, "write metrics of the cell there after each run")
+    add_value(parser, "--folder", "FOLDER", "where the units are, if elsewhere", Path)
+    parser.add_json()
+
+
+def _status(commands: Any) -> None:  # noqa: ANN401
+    parser = add_command(commands, "status", "all cells at a glance: verdicts, and what waits for a person")
+    parser.add_argument("cells", type=Path, nargs="*", metavar="CELL", help="cell files (TOML)")
+    words = "instead of cell files: all cells that share this archive"
+    add_value(parser, "--archive", "URL", words)
+    add_output(parser, "--metrics", METRICS, "write it as metrics for Prometheus' node exporter too")
+    parser.add_json()
+
+
+def _notify(commands: Any) -> None:  # noqa: ANN401
+    summary = "who hears of unattended runs: list, try, send what waits"
+    parser = add_command(commands, "notify", summary, "unattended.notify")
+    parser.add_cell()
+    what = parser.add_mutually_exclusive_group()
+    add_flag(what, "--test", "notify everybody of a test now")
+    add_flag(what, "--send", "send what earlier runs could not")
+    parser.add_json()
+
+
+def _serve(commands: Any) -> None:  # noqa: ANN401
+    summary = "serve the results of a cell by OPC UA until interrupted"
+    add_command(commands, "serve", summary, "serve.results").add_cell()
+
+
+def _cell(commands: Any) -> None:  # noqa: ANN401
+    parser = add_command(commands, "cell", "validate or show a cell file, or print its schema")
+    actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True, dest="action")
+    for name, summary in (
+        ("validate", "check it; every mistake with its line"),
+        ("schema", "print the JSON Schema of cell files, for editors and other programs"),
+        ("show", "print it with defaults filled in, and the origin of each value"),
+    ):
+        action = add_parser(actions, name, summary)
+        if name != "schema":
+            action.add_cell()
+        action.add_json()
+
+
+def _completion(commands: Any) -> None:  # noqa: ANN401
+    summary = "print a script that lets a shell complete commands and files"
+    parser = add_command(commands, "completion", summary)
+    parser.add_argument("shell", choices=SHELLS, metavar="SHELL", help=f"one of {', '.join(SHELLS)}")
+
+
+def _apply(commands: Any) -> None:  # noqa: ANN401
+    summary = "write the proposal of a run into the controller's config"
+    parser = add_command(commands, "apply", summary, "config.apply_run")
+    parser.add_run()
+    _add_reason(parser)
+    parser.add_json()
+
+
+def _rollback(commands: Any) -> None:  # noqa: ANN401
+    summary = "undo what was written into the controller's config"
+    parser = add_command(commands, "rollback", summary, "config.rollback_config")
+    parser.add_cell()
+    words = "restore what this run wrote, by its folder or name (default: undo the latest write)"
+    add_value(parser, "--to", "RUN", words)
+    _add_reason(parser)
+    parser.add_json()
+
+
+def _add_reason(parser: Parser) -> None:
+    words = "why, for `history --changes`: one line of text"
+    parser.add_argument("--reason", default="", metavar="TEXT", help=words)
+
+
+def _history(commands: Any) -> None:  # noqa: ANN401
+    parser = add_command(commands, "history", "list the runs of a cell, compare two, see what drifts")
+    parser.usage = (
+        "hexacell history [-h] [--compare RUN RUN | --show RUN |\n"
+        "                        --keep DAYS [--delete] | --drift | --changes]\n"
+        "                        [--archive URL] [--json] [CELL]"
+    )  # argparse does not break a group
+    words = "the cell file; without it all of --archive"
+    parser.add_argument("cell", type=Path, nargs="?", metavar="CELL", help=words)
+    what = parser.add_mutually_exclusive_group()
+    words = "what changed from one run to another, parameter by parameter"
+    what.add_argument("--compare", nargs=2, metavar=("RUN", "RUN"), help=words)
+    add_value(what, "--show", "RUN", "what happened in a run, and when")
+    words = "which runs that ended before may be deleted; those that wrote the config never may"
+    add_value(what, "--keep", "DAYS", words, float)
+    add_flag(what, "--drift", "the trend of every parameter over all runs")
+    add_flag(what, "--changes", "every write into the controller's config: when, who, what and why")
+    add_flag(parser, "--delete", "with --keep: delete those")
+    words = "the index over the runs: postgresql://user@host/database (default: as [archive] has it)"
+    add_value(parser, "--archive", "URL", words)
+    parser.add_json()
+
+
+def _report(commands: Any) -> None:  # noqa: ANN401
+    summary = "write the report of a run: one file to read, print and file"
+    parser = add_command(commands, "report", summary, "recorded.report")
+    parser.add_run()
+    add_output(
+        parser,
+        "--output",
+        REPORT,
+        "where to (default: report.html in the run folder); .pdf gives PDF/A, .xml a Digital Calibration "
+        "Certificate",
+    )
+    add_value(parser, "--compare", "RUN", "say also what has changed since this run, a folder", Path)
+    parser.add_json()
+
+
+COMMANDS = (
+    *(_demo, _run, _tui, _length, _preflight, _simulate, _host, _next, _fit, _replay),
+    *(_apply, _rollback, _history, _report),
+    *(_devices, _schedule, _status, _notify, _serve, _cell, _completion),
+    _studies,
+)
+"""What adds them to a parser."""

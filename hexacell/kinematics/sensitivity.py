@@ -106,7 +106,8 @@ def _by_inverse(
     """The sensitivity by the inverses (n, 6, 6) of the pose Jacobians."""
     by_constraints = -inverse[:, :coordinates]
     products = by_constraints[..., None] * linear.parameters[..., None, :, :]
-    of_legs = products.reshape(*products.shape[:2], -1)  # by the numbers of leg 1, 2, ...
+    legs_times_each = products.shape[2] * products.shape[3]  # of no pose numpy cannot infer it
+    of_legs = products.reshape(*products.shape[:2], legs_times_each)  # by the numbers of leg 1, 2, ...
     order, convention = mechanism.parameters.leg_order, mechanism.convention
     by_free: Array = np.take(of_legs, order[convention.free_rows], axis=-1)
     for row, column in convention.dependent:

@@ -158,8 +158,8 @@ def noise_again(
     # A random walk of n steps varies about its mean by a sixth of n.
     counted = len(visited.visits) + len(visited.pilots)
     every = [one.reading for one in visited.samples[:1]] + [one.reading for one in visited.visits]
-    first, *_, last = sorted(every, key=lambda one: one.at_s or 0.0)
-    steps = readings_between(first, last, counted, walk_s) / 6.0
+    every.sort(key=lambda one: one.at_s or 0.0)
+    steps = readings_between(every[0], every[-1], counted, walk_s) / 6.0 if every else 0.0
     return assess_again(plan, visits, state.noise.noise, found, walk_mm * float(np.sqrt(steps)))
 
 

@@ -16,7 +16,7 @@ from procedures.steps import events
 from tests.faults.cell import HELD_OUT_ORIENTATIONS, ORIENTATIONS, POINTS, Site
 from tests.faults.steps import step_of
 
-DIRECTIONS = [f"d{joint}" for joint in range(1, 7)]
+HOW_IT_CAME = ["time_s", *(f"d{joint}" for joint in range(1, 7))]
 
 
 def whole_lines(journal: bytes) -> bytes:
@@ -69,20 +69,20 @@ def _ends(event: events.Event, key: SetKey) -> bool:
 def require_identical(site: Site, undisturbed: Site) -> None:
     """Without noise, an interrupted run ends as one that nothing disturbed, to the last digit.
 
-    But it may come to a pose by another way: then joints arrive from other sides, and what that says of
-    backlash is another number.
+    But later, and it may come to a pose by another way: then joints arrive from other sides, and what that
+    says of backlash is another number.
     """
     run, reference = site.run(), undisturbed.run()
     assert (run.path / "config-before").read_bytes() == (reference.path / "config-before").read_bytes()
-    assert _without_directions(run.measurements) == _without_directions(reference.measurements)
+    assert _as_measured(run.measurements) == _as_measured(reference.measurements)
     assert _without_evidence(run.result) == _without_evidence(reference.result)
     assert site.config.read_bytes() == undisturbed.config.read_bytes()
 
 
-def _without_directions(measurements: Path) -> list[dict[str, str]]:
+def _as_measured(measurements: Path) -> list[dict[str, str]]:
     with measurements.open(newline="") as stream:
         return [
-            {name: text for name, text in row.items() if name not in DIRECTIONS}
+            {name: text for name, text in row.items() if name not in HOW_IT_CAME}
             for row in csv.DictReader(stream)
         ]
 

@@ -75,7 +75,7 @@ def test_the_deviation_before_and_after_is_that_of_the_raw_readings(demo):
     assert len(before) == len(after) == 3 * 5
     assert told[0] == pytest.approx(np.mean(before), abs=0.005)
     assert told[1] == pytest.approx(np.mean(after), abs=0.0005)
-    assert np.mean(after) < 0.01 * np.mean(before)
+    assert np.mean(after) < 0.02 * np.mean(before)  # both by chance: noise is 0.02 to 0.04 mm of it
 
 
 def test_the_demo_measures_its_noise_and_says_so(demo):

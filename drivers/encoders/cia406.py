@@ -3,12 +3,13 @@
 import threading
 from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar
 
 from drivers.encoders import node_identity
 from drivers.encoders.bank import BankSession, ThreadedBank, bus_settings
 from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode, Leg, explained
-from drivers.encoders.node_monitor import AlarmPoll, NodeMonitor, check_nodes
+from drivers.encoders.node_monitor import AlarmPoll, AlarmTiming, NodeMonitor, check_nodes
 from drivers.encoders.object_dictionary import DeviceType, NmtCommand
 from drivers.encoders.sync_sampling import SyncSampler, configure_position_tpdo, follow_plain_sync
 from drivers.errors import SilentNodeError
@@ -19,6 +20,8 @@ from hexacell.cell.devices import EncoderSettings
 
 class EncoderSession(BankSession):
     """Opens, identifies, configures and starts the nodes; then takes samples."""
+
+    alarm_timing: ClassVar[AlarmTiming] = AlarmTiming()
 
     def __init__(
         self, settings: EncoderSettings, closing: threading.Event, trace: TraceRecorder | None
@@ -78,7 +81,7 @@ class EncoderSession(BankSession):
 
         self._sampler = sampler
         self.bus.health_check = check_all
-        self._alarms = AlarmPoll(nodes, monitors)
+        self._alarms = AlarmPoll(nodes, monitors, self.alarm_timing)
         for node in nodes:
             node.command(NmtCommand.START)
         sampler.sample()

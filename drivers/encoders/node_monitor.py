@@ -150,10 +150,19 @@ def check_nodes(monitors: Sequence[NodeMonitor]) -> None:
             raise invalid_sample(f"reports {monitor.emergency}", monitor.leg.subject, monitor.action)
 
 
-ALARM_PERIOD_S, BUS_SHARE = 0.1, 0.02
-"""Shortest period of reading alarm entries; largest share of the time, where samples follow each other."""
-WARNINGS_EVERY = 10
-"""Warnings are read at one of so many readings: an SDO takes as long as a position."""
+@dataclass(frozen=True, slots=True)
+class AlarmTiming:
+    """When alarm entries are read.
+
+    Attributes:
+        period_s: shortest period.
+        bus_share: largest share of the time, where samples follow each other without a pause.
+        warnings_every: warnings are read at one of so many readings: an SDO takes as long as a position.
+    """
+
+    period_s: float = 0.1
+    bus_share: float = 0.02
+    warnings_every: int = 10
 
 
 @dataclass(eq=False)
@@ -166,6 +175,7 @@ class AlarmPoll:
 
     nodes: Sequence[EncoderNode]
     monitors: Sequence[NodeMonitor]
+    timing: AlarmTiming = AlarmTiming()
     _emergencies_seen: int = -1
     _polls: int = 0
 
@@ -195,14 +205,14 @@ class AlarmPoll:
         now_s = time.monotonic()
         self._sampling_s += now_s - self._begun_s
         emergencies = sum([monitor.emergencies for monitor in self.monitors])
-        since_s = now_s - self._polled_s
-        is_cheap = since_s >= 2.0 * self._sampling_s or BUS_SHARE * since_s >= self._cost_s
-        if emergencies == self._emergencies_seen and not (since_s >= ALARM_PERIOD_S and is_cheap):
+        since_s, timing = now_s - self._polled_s, self.timing
+        is_cheap = since_s >= 2.0 * self._sampling_s or timing.bus_share * since_s >= self._cost_s
+        if emergencies == self._emergencies_seen and not (since_s >= timing.period_s and is_cheap):
             return
         self._polls += 1
         self._emergencies_seen = -1  # due again at once, should one be found
         for node, entry in self._entries:
-            if entry is od.WARNINGS and self._polls % WARNINGS_EVERY != 0:
+            if entry is od.WARNINGS and self._polls % timing.warnings_every != 0:
                 continue
             value = node.read(entry)
             if entry is od.ERROR_REGISTER:

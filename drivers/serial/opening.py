@@ -10,6 +10,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -206,12 +207,17 @@ BIT_7 = 0x80
 DAMAGED = 0xFF
 IFLAG = 0
 ODD_BITS = {"E": 0, "O": 1}
-TERMINAL, SOFTWARE = "terminal", "software"
-"""Who checks the parity of received bytes: ``parity_check`` in a gauge's ``serial`` table.
 
-``SOFTWARE`` is for lines that pass eight bits on, of which the last is the parity: a network server set to
-8N2 has no terminal that could check it for a gauge with 7E2.
-"""
+
+class ParityCheck(StrEnum):
+    """Who checks the parity of received bytes: ``parity_check`` in a gauge's ``serial`` table.
+
+    ``SOFTWARE`` is for lines that pass eight bits on, of which the last is the parity: a network server
+    set to 8N2 has no terminal that could check it for a gauge with 7E2.
+    """
+
+    TERMINAL = "terminal"
+    SOFTWARE = "software"
 
 
 class ParityInBit7:
@@ -245,10 +251,10 @@ def in_software(settings: dict[str, object]) -> ParityInBit7 | None:
     Raises:
         FileError: ``parity_check`` is unknown, or the line has not seven bits with a parity.
     """
-    word = settings.pop("parity_check", TERMINAL)
-    if word not in {TERMINAL, SOFTWARE}:
+    word = settings.pop("parity_check", ParityCheck.TERMINAL)
+    if word not in set(ParityCheck):
         raise _refused(f"parity_check {word!r} is unknown", "Write 'terminal' or 'software'")
-    if word == TERMINAL:
+    if word == ParityCheck.TERMINAL:
         return None
     odd = ODD_BITS.get(str(settings.get("parity", "N")))
     if odd is None or settings.get("bytesize") != 7:

@@ -6,7 +6,7 @@ import pytest
 
 from drivers.encoders import node_monitor as alarm_poll
 from drivers.encoders.canopen_node import Leg
-from drivers.encoders.node_monitor import AlarmPoll
+from drivers.encoders.node_monitor import AlarmPoll, AlarmTiming
 from drivers.encoders.object_dictionary import WARNINGS
 from drivers.errors import InvalidSampleError
 
@@ -58,10 +58,10 @@ def test_samples_leave_it_a_small_share_of_the_bus_and_each_pause(bus) -> None:
     begun_s, bus.read_s = bus.now_s, 0.0
     while bus.now_s < begun_s + 20.0:
         sample(bus, poll)
-    assert 0.8 * alarm_poll.BUS_SHARE < bus.read_s / (bus.now_s - begun_s) <= alarm_poll.BUS_SHARE
+    assert 0.8 * AlarmTiming().bus_share < bus.read_s / (bus.now_s - begun_s) <= AlarmTiming().bus_share
     poll = AlarmPoll(bus.nodes, [])
     for _ in range(20):
-        bus.now_s += alarm_poll.ALARM_PERIOD_S
+        bus.now_s += AlarmTiming().period_s
         before_s = bus.read_s
         sample(bus, poll)
         assert bus.read_s > before_s
@@ -70,7 +70,7 @@ def test_samples_leave_it_a_small_share_of_the_bus_and_each_pause(bus) -> None:
 def test_an_alarm_once_found_is_found_again_until_it_is_gone(bus):
     poll = AlarmPoll(bus.nodes, [])
     bus.value = 1
-    bus.now_s += alarm_poll.ALARM_PERIOD_S
+    bus.now_s += AlarmTiming().period_s
     for _ in range(3):
         with pytest.raises(InvalidSampleError, match="leg 1"):
             sample(bus, poll)

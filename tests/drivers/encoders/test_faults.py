@@ -7,8 +7,8 @@ import pytest
 
 from drivers.encoders import node_monitor
 from drivers.encoders.can_bus import ERROR_FRAMES
-from drivers.encoders.cia406 import Cia406Bank
-from drivers.encoders.node_monitor import advice_for
+from drivers.encoders.cia406 import Cia406Bank, EncoderSession
+from drivers.encoders.node_monitor import AlarmTiming, advice_for
 from drivers.encoders.object_dictionary import ALARMS, ERROR_REGISTER, WARNINGS
 from drivers.errors import BusError, InvalidSampleError, RestartedNodeError, SilentNodeError
 from tests.waiting import until
@@ -80,7 +80,7 @@ async def test_an_emergency_during_a_sample_makes_it_invalid(raw, opened):
 
 
 async def test_the_alarms_are_read_after_an_emergency(raw, bank, monkeypatch):
-    monkeypatch.setattr(node_monitor, "ALARM_PERIOD_S", 60.0)
+    monkeypatch.setattr(EncoderSession, "alarm_timing", AlarmTiming(60.0))
     for node in raw.nodes.values():
         node.objects[0x6503, 0] = bytes(2)
     await bank.open()
@@ -97,8 +97,7 @@ async def test_the_alarms_are_read_after_an_emergency(raw, bank, monkeypatch):
 
 @pytest.fixture
 def alarms_read_always(monkeypatch):
-    for name, value in {"ALARM_PERIOD_S": 0.0, "BUS_SHARE": math.inf, "WARNINGS_EVERY": 1}.items():
-        monkeypatch.setattr(node_monitor, name, value)
+    monkeypatch.setattr(EncoderSession, "alarm_timing", AlarmTiming(0.0, math.inf, 1))
 
 
 async def test_alarms_without_an_emergency_are_found(raw, bank, alarms_read_always):

@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 
 from drivers.conformance import served_encoder_twin
-from drivers.encoders import node_monitor
 from drivers.encoders.bank import ThreadedBank
-from drivers.encoders.cia406 import Cia406Bank
+from drivers.encoders.cia406 import Cia406Bank, EncoderSession
 from drivers.encoders.dbc import DbcBank
 from drivers.encoders.modbus import ModbusBank
+from drivers.encoders.node_monitor import AlarmTiming
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
 from drivers.simulated.gauges.server import LineFault
 from hexacell.cell.devices import LinearEncoderSettings
@@ -223,8 +223,7 @@ def rows_of(table: str) -> set[Row]:
 
 @pytest.fixture(autouse=True)
 def alarms_are_read_with_every_sample(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, value in {"ALARM_PERIOD_S": 0.0, "BUS_SHARE": math.inf, "WARNINGS_EVERY": 1}.items():
-        monkeypatch.setattr(node_monitor, name, value)
+    monkeypatch.setattr(EncoderSession, "alarm_timing", AlarmTiming(0.0, math.inf, 1))
 
 
 @pytest.mark.slow

@@ -90,14 +90,15 @@ def fit_measurements(
     robot, settings, measured = robot_of(cell), cell.settings, None
     if folder is not None and folder.journal.is_file():
         from hexacell.noise.measured_noise import with_measured_noise  # noqa: PLC0415 - only for a run
-        from hexacell.services.history.recorded_cell import commanding_geometries, noise_of_run, walk_of_run  # noqa: PLC0415 - likewise
+        from hexacell.services.history.recorded_cell import commanding_geometries, recorded_state  # noqa: PLC0415 - likewise
 
-        robot = replace(robot, earlier=(*commanding_geometries(folder, cell.settings), *robot.earlier))
-        if (measured := noise_of_run(folder, cell.settings)) is not None:
+        run = recorded_state(folder, settings)
+        robot = replace(robot, earlier=(*commanding_geometries(run, robot.mechanism), *robot.earlier))
+        if run.noise is not None:
+            measured = run.noise.noise
             settings = with_measured_noise(settings, measured)
             robot = robot.with_errors_of(settings)
-        walk_mm, walk_s = walk_of_run(folder, settings)
-        robot = replace(robot, noise=replace(robot.noise, walk_mm=walk_mm, walk_s=walk_s))
+        robot = replace(robot, noise=replace(robot.noise, walk_mm=run.walk_mm, walk_s=run.walk_s))
     known = known_parts(one.temperatures for one in measurements.records)
     robot = replace(robot, effects=stated_effects(settings, known=known))
     if identify_only is not None:

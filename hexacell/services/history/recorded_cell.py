@@ -16,7 +16,7 @@ from hexacell.config.interface import ControllerGeometry
 from hexacell.errors import HexacellError
 from hexacell.identification.problem.commanded_poses import CommandingGeometry
 from hexacell.kinematics.geometry import Geometry
-from hexacell.noise.measured_noise import MeasuredNoise
+from hexacell.kinematics.mechanism import Mechanism
 from hexacell.robot.model import Robot, make_robot
 from hexacell.runs.run_folder import RunFolder, run_folders
 from hexacell.services.history.journal_soundness import read_sound
@@ -49,24 +49,11 @@ def started_robot(settings: CellSettings, started: RunStarted) -> Robot:
     return make_robot(settings, commanding, taught=Geometry.of(parameters, started.taught))
 
 
-def noise_of_run(folder: RunFolder, settings: CellSettings) -> MeasuredNoise | None:
-    """The noise that a run measured; None if it did not, or the folder is not that of a run."""
-    measured = _state_of(folder, settings).noise
-    return None if measured is None else measured.noise
-
-
-def walk_of_run(folder: RunFolder, settings: CellSettings) -> tuple[float, float]:
-    """How far the gauges of a run drifted from one reading to the next, mm, and in what time, s; else 0."""
-    state = _state_of(folder, settings)
-    return state.walk_mm, state.walk_s
-
-
-def commanding_geometries(folder: RunFolder, settings: CellSettings) -> tuple[CommandingGeometry, ...]:
+def commanding_geometries(state: RunState, mechanism: Mechanism) -> tuple[CommandingGeometry, ...]:
     """The geometries that commanded a run: its controller's, and a provisional one in the same frames.
 
-    Empty if the folder is not that of a run of such a mechanism.
+    Empty if nothing is known of the run.
     """
-    state, mechanism = _state_of(folder, settings), settings.mechanism
     started, parameters = state.started, mechanism.parameters
     if started is None:
         return ()
@@ -76,7 +63,7 @@ def commanding_geometries(folder: RunFolder, settings: CellSettings) -> tuple[Co
     return own, CommandingGeometry(Geometry.of(parameters, state.provisional.geometry), own.frames)
 
 
-def _state_of(folder: RunFolder, settings: CellSettings) -> RunState:
+def recorded_state(folder: RunFolder, settings: CellSettings) -> RunState:
     """State of a run; empty if its journal cannot be read, or is of another kind of machine."""
     try:
         return read_sound(folder, settings)[1]

@@ -19,7 +19,7 @@ from hexacell.kinematics.pose import FrameTransform
 from hexacell.measurements.records import MeasurementSet
 from hexacell.noise.measured_noise import InstrumentNoise, MeasuredNoise
 from hexacell.runs.run_folder import RunFolder
-from hexacell.services.history.recorded_cell import commanding_geometries, noise_of_run
+from hexacell.services.history.recorded_cell import commanding_geometries, recorded_state
 from hexacell.services.offline import fit_measurements
 from hexacell.text.identification import identification_report
 from procedures.run.keys import Phase, SetKey
@@ -76,7 +76,8 @@ def test_they_are_those_of_the_journal_in_the_frames_of_the_run(tmp_path, paper)
     controller = Hexaglide().change_frames(paper.nominal, ON_FLOOR)
     lent = events.ProvisionalApplied(geometry=paper.calibrated.document(), folder="lent")
     settings = load_cell(bundled_config("simulated-hexaglide")).settings
-    own, provisional = commanding_geometries(run_of(tmp_path, started(controller, paper), lent), settings)
+    run = recorded_state(run_of(tmp_path, started(controller, paper), lent), settings)
+    own, provisional = commanding_geometries(run, settings.mechanism)
     np.testing.assert_allclose(own.geometry.vector, paper.nominal.vector, atol=1e-9)
     np.testing.assert_array_equal(provisional.geometry.vector, paper.calibrated.vector)
     for one in (own, provisional):
@@ -95,10 +96,8 @@ def test_records_in_a_run_folder_are_weighted_by_the_noise_that_the_run_measured
     noise, reading = measured_noise(0.01, 0.04, 0.01), READING.model_copy(update={"counts": ((0,) * 6,)})
     closed = events.SetClosed(at=noise.at, drift_mm=(0.0,) * 3, reading=reading, walk_mm=0.002, walk_s=20.0)
     run = run_of(tmp_path, started(paper.nominal, paper), noise, closed)
-    told = noise_of_run(run, cell.settings)
-    assert told is not None
     assessed = fit_measurements(cell, measured, run)
-    assert assessed.measured_noise == told
+    assert assessed.measured_noise == noise.noise
     assert "noise                    gauges 10 to 40, encoders 10 um" in identification_report(assessed)
     assert assessed.found.problem.noise.gauges_mm == pytest.approx([0.01, 0.04, 0.01])
     assert assessed.found.problem.noise.walk_mm == 0.002, "the drift that it found"
@@ -107,9 +106,9 @@ def test_records_in_a_run_folder_are_weighted_by_the_noise_that_the_run_measured
     assert "noise                    gauges" not in identification_report(alone)
     assert alone.found.problem.noise.gauges_mm == pytest.approx([0.01, 0.01, 0.01])
     assert assessed.found.goodness.ratio < alone.found.goodness.ratio
-    nothing = RunFolder(tmp_path / "nothing")
-    assert noise_of_run(nothing, cell.settings) is None
-    assert commanding_geometries(nothing, cell.settings) == ()
+    nothing = recorded_state(RunFolder(tmp_path / "nothing"), cell.settings)
+    assert nothing.noise is None
+    assert commanding_geometries(nothing, cell.settings.mechanism) == ()
 
 
 def test_records_in_a_run_folder_are_fitted_after_the_controller_got_other_frames(

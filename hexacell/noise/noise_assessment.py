@@ -17,7 +17,6 @@ import numpy as np
 from hexacell.campaign.budget import Budget
 from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.planner import Plan
-from hexacell.cell.model import CellSettings
 from hexacell.identification.problem.prior import Noise
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.parameters import JointUnit
@@ -261,15 +260,10 @@ def _windows_taken(plan: Plan, forecasts: tuple[measured_noise.AveragingForecast
 
     What a goal other than the geometry needs, no error at the task poses says.
     """
-    stated = plan.settings.noise.averaged_windows
+    stated, limits = plan.settings.noise.averaged_windows, plan.settings.acceptance
     if stated is not None or plan.goal is not None:
         return worthwhile_windows(forecasts, stated or 1)
-    return worthwhile_windows(forecasts, MOST_UNASKED, _enough_mm(plan.settings))
-
-
-def _enough_mm(settings: CellSettings) -> float:
-    """The error at the task poses, one standard deviation, mm, less than which nobody asked for."""
-    limits, target = settings.acceptance, settings.identification.target_mm
-    if target is not None:
-        return target
-    return NEAR_LIMIT * limits.position_mm / (limits.guard_band_factor * COVERAGE_FACTOR)
+    enough_mm = plan.settings.identification.target_mm
+    if enough_mm is None:
+        enough_mm = NEAR_LIMIT * limits.position_mm / (limits.guard_band_factor * COVERAGE_FACTOR)
+    return worthwhile_windows(forecasts, MOST_UNASKED, enough_mm)

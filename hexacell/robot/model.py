@@ -10,11 +10,8 @@ from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import ConfigLayout, controller_geometry
 from hexacell.errors import FileError
 from hexacell.identification.belief import RobotBelief
-from hexacell.identification.diagnostics.tolerance_check import (
-    ToleranceViolation,
-    largest_change,
-    tolerance_violations,
-)
+from hexacell.identification.diagnostics.geometry_change import largest_change
+from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation, tolerance_violations
 from hexacell.identification.identified_zeros import (
     HeldParameters,
     IdentifiedZeros,

@@ -18,8 +18,8 @@ from hexacell.errors import HexacellError
 from hexacell.plugins import plugin_failures_named
 from hexacell.printable import printable
 from hexacell.screen import overlays, tabs
+from hexacell.screen.further_screens import AssistantScreen, DigitsScreen, PlanScreen
 from hexacell.screen.preferences import KEYS, ONCE, SCREEN_THEMES, THEMES, ScreenAction, ScreenPreferences
-from hexacell.screen.tabs import AssistantScreen, DigitsScreen, PlanScreen
 from hexacell.screen.widgets import KeyLine
 from hexacell.text.screens.views import FaultView
 

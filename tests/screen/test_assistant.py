@@ -15,8 +15,8 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.errors import FileError, HexacellError
 from hexacell.screen.app import TechnicianApp
+from hexacell.screen.further_screens import AssistantScreen
 from hexacell.screen.model import ScreenModel
-from hexacell.screen.tabs import AssistantScreen
 from hexacell.services.devices.device_search import SearchFindings, draft_of
 from hexacell.services.devices.first_cell import CellDraft
 from tests.screen.test_history_screen import WithoutDevices

@@ -16,8 +16,8 @@ from hexacell.kinematics.pose import Pose
 from hexacell.run_process.messages import StatusChanged
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.child import Preflight, TriedPlan
+from hexacell.screen.further_screens import AssistantScreen
 from hexacell.screen.preferences import THEMES
-from hexacell.screen.tabs import AssistantScreen
 from hexacell.services.history.run_index import PastRun
 from hexacell.text.screens.views import ChecklistItem, Mark
 from hexacell.verdict.acceptance_gates import AcceptanceGate

@@ -58,9 +58,6 @@ SMALLER = 0.25
 LEAST_GAIN = 1e-3
 """Share of T that a step must gain to count."""
 
-STEPS = 5
-"""Steps of :func:`largest_change`; turns of some degrees need three."""
-
 NO_CONTRADICTION = 1.0
 """A value of T below any limit: better frames need not be looked for."""
 
@@ -321,41 +318,3 @@ def small_change(change: Array) -> FrameTransform:
     """A change of the frames by a shift, mm, a turn of the base and one of the platform, rad (9,)."""
     shift, base, platform = change.reshape(3, 3)
     return FrameTransform(rotations.from_vector(base), shift, rotations.from_vector(platform))
-
-
-def largest_change(
-    mechanism: Mechanism, before: Geometry, geometry: Geometry, tolerances: Tolerances
-) -> float:
-    """The largest change of a parameter from one geometry to another, in the best choice of frames.
-
-    In the frames of the convention a robot within tolerances of 7 mm differs by up to 30 mm from its
-    drawing, because the few joints that define them are off as well. The frames are therefore fitted to
-    all parameters, each in units of its tolerance, by Gauss-Newton steps; and where the ball may be mounted
-    elsewhere, its offset.
-
-    Args:
-        mechanism: of both.
-        before: in its own frames.
-        geometry: in the mechanism's frame convention.
-        tolerances: what changes of different parameters are compared by.
-
-    Returns:
-        mm, or mrad of an angle; infinite where the geometry is not a number.
-    """
-    if not np.isfinite(geometry.vector).all():
-        return float("inf")
-    count = len(before.vector)
-    fitter = ToleranceFitter(mechanism, before, tolerances, geometry, np.zeros((count, count)))
-    frames = mechanism.normalize_frames(before)[1].inverse()
-    columns = mechanism.frame_freedom.columns
-    coordinates, turned = 3 if tolerances.ball_mm else 0, len(columns)
-    ball = (before.parameters.ball_offset.T / fitter.widths[:, None])[:, :coordinates]
-    offset = np.zeros(coordinates)
-    for _ in range(STEPS):
-        moving, difference = fitter.by_frames(frames), fitter.difference(frames) + ball @ offset
-        solved = np.linalg.lstsq(np.hstack([moving, ball]), -difference, rcond=None)[0]
-        step = np.zeros(9)
-        step[columns] = solved[:turned] * fitter.frame_scales
-        frames, offset = frames.then(small_change(step)), offset + solved[turned:]
-    differences = fitter.difference(frames) + ball @ offset
-    return float(np.abs(differences * fitter.widths / before.parameters.like_a_mm).max())

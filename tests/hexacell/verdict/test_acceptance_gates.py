@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.identification.diagnostics.tolerance_check import largest_change, tolerance_violations
+from hexacell.identification.diagnostics.geometry_change import largest_change
+from hexacell.identification.diagnostics.tolerance_check import tolerance_violations
 from hexacell.identification.problem.prior import Noise, Tolerances
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.result import Termination

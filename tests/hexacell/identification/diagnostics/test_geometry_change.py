@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.identification.diagnostics.tolerance_check import largest_change
+from hexacell.identification.diagnostics.geometry_change import largest_change
 from hexacell.kinematics import rotations
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import FrameTransform

@@ -106,6 +106,7 @@ def resumed(folder: Path, seed: int, share: float, duration_s: float) -> Resumed
     ended = hexacell(site, "--mode", "optimise", "--resume", str(site.run().path))
     assert ended is not None
     shutil.rmtree(folder)
+    print(f"\n{share:.3f}, {step}: {ended.words.splitlines()[-1:]}", flush=True)
     return Resumed(share, step, ended)
 
 
@@ -126,5 +127,3 @@ def test_a_first_resume_ends_every_killed_run_with_a_pass(figure, tmp_path) -> N
     figure("killed in", ", ".join(f"{step} {count}" for step, count in steps.most_common(6)))
     confirmed = sum("new records show whether by chance" in one.ended.words for one in done)
     figure("of these with confirming records after a test that failed narrowly", confirmed)
-    for one in others:
-        print(f"\n{one.share:.3f}, {one.step}: {one.ended.words.splitlines()[-1:]}")

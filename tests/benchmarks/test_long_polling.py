@@ -144,9 +144,12 @@ async def test_a_day_of_polling_with_random_faults(figure, monkeypatch, caplog) 
     cell = FaultyCell(monkeypatch)
     day = Day(cell, Random(24))
     await cell.open()
-    before = None
+    before, told = None, 0
     while (hours := cell.elapsed_s / 3600) < HOURS:
         await day.go_on()
+        if hours >= told + 1:
+            told = int(hours)
+            print(f"\n{told} h: {day.outcome}", flush=True)
         if before is None and hours > HOURS / 4:
             before = Resources.now()
     after, outcome = Resources.now(), day.outcome

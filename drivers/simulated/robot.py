@@ -226,14 +226,19 @@ class SimulatedMachine:
         return PoseBatch(position[None], (rotations.from_vector(share * turn) @ line.rotations[row])[None])
 
     def _straight_line(self, start: PoseBatch, end: PoseBatch) -> tuple[PoseBatch, Array]:
-        """Poses (n) on a line and their joints (n, 6), between which joints may go at one rate."""
+        """Poses (n) on a line and their joints (n, 6), between which joints may go at one rate.
+
+        Where the force of a leg with play changes its sign the joint jumps, which no segment is short
+        enough for: what counts is how the joints bend without the corrections.
+        """
         steps = LINE_STEPS
         while True:
             line = interpolate_line(start, end, 2 * steps)
-            joints = with_longer_legs(self.mechanism, self._geometry, line, self._joints(line))
+            joints = self._joints(line)
             error = np.abs(joints[1::2] - 0.5 * (joints[:-1:2] + joints[2::2])).max()
             if not error > LINE_MM or steps >= MOST_STEPS:
-                return line[::2], joints[::2]
+                sent = with_longer_legs(self.mechanism, self._geometry, line, joints)
+                return line[::2], sent[::2]
             steps *= 2
 
     def _joints(self, poses: PoseBatch) -> Array:

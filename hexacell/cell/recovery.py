@@ -101,7 +101,7 @@ class UnattendedRecovery(Escalations):
 
     gauge_silent: Escalation = key(("retry", *_REDO), "no answer, or an invalid one")
     gauge_setting: Escalation = key(_ABORT, "inches, hold, a wrong mode, a low battery")
-    gauge_at_end: Escalation = key(("redo-set", "abort"), "a plunger at an end at a reference")
+    gauge_at_end: Escalation = key(_REDO, "a plunger at an end at a reference")
     mounting: Escalation = key(_ABORT, "gauges are not mounted as they must be")
     unsettled: Escalation = key(
         ("retry", "measure-again", "redo-set", "abort"), "the readings did not settle"

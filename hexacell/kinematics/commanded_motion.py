@@ -69,13 +69,25 @@ class RefusedCommand:
 
 @dataclass(frozen=True, slots=True)
 class RefusedCommands:
-    """All commands that are not given; none at first."""
+    """All commands that are not given; none at first.
+
+    Attributes:
+        unsuitable: those that may be passed, and at which nothing is measured.
+    """
 
     commands: tuple[RefusedCommand, ...] = ()
+    unsuitable: tuple[RefusedCommand, ...] = ()
 
     def __or__(self, others: "RefusedCommands") -> "RefusedCommands":
         """These commands and others, each once."""
-        return RefusedCommands(tuple(dict.fromkeys((*self.commands, *others.commands))))
+        return RefusedCommands(
+            tuple(dict.fromkeys((*self.commands, *others.commands))),
+            tuple(dict.fromkeys((*self.unsuitable, *others.unsuitable))),
+        )
+
+    def suit(self, poses: PoseBatch, frames: FrameTransform | None = None) -> Mask:
+        """At which of n commands something may be measured, see :meth:`allow`."""
+        return RefusedCommands(self.commands + self.unsuitable).allow(poses, frames)
 
     def allow(self, poses: PoseBatch, frames: FrameTransform | None = None) -> Mask:
         """Which of n commands no refusal concerns.

@@ -42,6 +42,7 @@ class RunState:
             0 where nothing is measured.
         position_unknown: the controller must be asked for the pose before the robot moves.
         excluded: poses that the controller refused, in the order of the refusals.
+        off_plate: commands on the way to which the ball left its plates, with those near them.
         failures: how many, by kind and place, since the run was begun or resumed.
         confirmation: the records that show whether a test of the model failed by chance.
         rolling_back: the old geometry is being restored.
@@ -75,6 +76,7 @@ class RunState:
     provisional_active: bool = False
     config_write_pending: bool = False
     excluded: tuple[events.PoseExcluded, ...] = ()
+    off_plate: tuple[RefusedCommand, ...] = ()
     failures: dict[tuple[FailureKind, str], int] = field(default_factory=dict)
     is_in_estop: bool = False
     recalled: str | None = None
@@ -150,10 +152,9 @@ class RunState:
 
     @property
     def refused(self) -> RefusedCommands:
-        """The commands that the controller refused in this run."""
-        return RefusedCommands(
-            tuple(RefusedCommand(one.pose, one.axis, one.is_highest) for one in self.excluded)
-        )
+        """The commands that the controller refused in this run, and those at which the ball left its plates."""
+        by_controller = (RefusedCommand(one.pose, one.axis, one.is_highest) for one in self.excluded)
+        return RefusedCommands(tuple(by_controller), self.off_plate)
 
     def is_left(self, key: SetKey) -> bool:
         """Whether a set cannot be measured, because its reference was refused."""

@@ -13,8 +13,10 @@ from pydantic import Field
 
 from drivers.interfaces import DeviceIdentity
 from hexacell.cell.fields import GeometryDocument
+from hexacell.cell.limits import NEAR_DEG, NEAR_MM
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.config.interface import ControllerLimits
+from hexacell.kinematics.commanded_motion import RefusedCommand
 from hexacell.kinematics.corrections import NO_CORRECTIONS, CorrectionKind, Corrections
 from hexacell.kinematics.mechanism import Branch
 from hexacell.results.result import AcceptedResult
@@ -215,11 +217,18 @@ class Failed(BaseEvent):
     asked: bool = False
 
     def applied_to(self, state: RunState) -> RunState:
-        """A ball that left its plate on the way to a chosen pose is a rejected record."""
+        """A ball that left its plate on the way to a chosen pose is a rejected record.
+
+        Where the whole set is measured again, nothing is measured near that pose: the robot is not what
+        the estimate holds it for there.
+        """
         where = (self.failure, place_of(self.step))
         counted = replace(state, failures={**state.failures, where: self.attempt}).without_position()
-        is_off_plate = self.failure is FailureKind.GAUGE_AT_END and self.action is not Action.REDO_SET
+        is_redone, is_off_plate = self.action is Action.REDO_SET, self.failure is FailureKind.GAUGE_AT_END
         match self.step:
+            case Move(at=at, pose=pose) if is_off_plate and is_redone and at.phase is Phase.IDENTIFY:
+                near = RefusedCommand(pose, within_mm=NEAR_MM, within_deg=NEAR_DEG)
+                counted = replace(counted, off_plate=(*counted.off_plate, near))
             case Move(at=at, orientation=orientation) if is_off_plate and at.phase is Phase.IDENTIFY:
                 counted = counted.with_set(at, counted.set(at).with_rejection(orientation))
         return counted.unverified() if self.action is Action.MEASURE_AGAIN else counted

@@ -9,14 +9,18 @@ import pytest
 
 from drivers.errors import PoseRefused
 from hexacell.campaign.pilots import FIRST_PILOT
+from hexacell.cell.limits import NEAR_DEG, NEAR_MM
+from hexacell.cell.recovery import Action
 from hexacell.cell.simulation import SoftLimits
 from hexacell.errors import ExitCode, IdentifiabilityError
+from hexacell.kinematics.commanded_motion import RefusedCommand, RefusedCommands
 from hexacell.kinematics.pose import Pose
 from procedures.run.keys import Phase
 from procedures.run.state import fold
+from procedures.run.trips import Guard, Trip
 from procedures.steps import events
 from tests.procedures.fakes import refused
-from tests.procedures.runs.listening import happened, run_until
+from tests.procedures.runs.listening import P2, UNATTENDED, failing, happened, run_until
 
 WIDE = 1e6
 
@@ -135,3 +139,18 @@ async def test_a_controller_that_refuses_one_pose_after_another_ends_the_run(mak
     with pytest.raises(PoseRefused, match="fails kinematicsInverse"):
         await rig.run()
     assert len(excluded(rig)) == 3
+
+
+async def test_a_pose_on_the_way_to_which_the_ball_left_its_plates_is_not_chosen_again(make_rig) -> None:
+    """The robot is not where the estimate holds it for, so that the same choice would fail as often."""
+    rig = make_rig()
+    off_plate = Trip(Guard.PLATE, "gauge y", "the ball is +5.53 mm from its reference", "Look at it").as_error()
+    struck = failing("P2/o03/move", lambda: rig.controller.failures.update(move=off_plate))
+    await run_until(rig, events.SetClosed, struck, count=2, policy=UNATTENDED)
+    (failed,) = happened(rig, events.Failed)
+    assert failed.action is Action.REDO_SET
+    near = RefusedCommands((RefusedCommand(failed.step.pose, within_mm=NEAR_MM, within_deg=NEAR_DEG),))
+    taken = [one for one in happened(rig, events.RecordTaken) if one.at == P2]
+    assert len(taken) >= 9
+    assert all(near.allows(one.pose) for one in taken[2:])
+    assert sent(rig)[f"move {Pose(*failed.step.pose)}"] == 1

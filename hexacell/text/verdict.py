@@ -25,6 +25,9 @@ VERDICT_MEANINGS = {
 NAMED_SOURCES = 4
 """Number of sources of uncertainty of a length check that are printed, the largest first."""
 
+NO_ERROR_SHARE = 0.05
+"""Share of U below which an error of the best geometry alone is none."""
+
 SMALLEST_MOVE = 0.001
 """Smallest displacement of what was taught that is printed, mm or deg: that of the numbers in a config."""
 
@@ -179,8 +182,11 @@ def improvement_sentence(
     before, after = "the current config", f"0 +- {shown(expected.expanded_mm)} with this one"
     if verified is not None:
         before, after = "the config before", f"{verified.position.with_u('mm')} with the new config"
-        if verified.alone is not None:
-            after = f"{verified.alone.with_u('mm')} with the best geometry alone, {after}"
+        if (alone := verified.alone) is not None:
+            # What goes by the side of arrival leaves the geometry right, and is all in U.
+            is_by_side = alone.expanded is not None and alone.value < NO_ERROR_SHARE * alone.expanded
+            size = f"up to {shown(alone.expanded)}" if is_by_side else alone.with_u("mm")
+            after = f"{size} with the best geometry alone, {after}"
     return f"Largest position error at the task poses: {now} with {before}, {after}."
 
 

@@ -33,8 +33,10 @@ FOUND = FoundTerms(
 )
 
 
-def told(history: Iterable[events.Event], found: FoundTerms = FOUND) -> tuple[events.Event, ...]:
-    """The events of a calibration, had it found this."""
+def told(
+    history: Iterable[events.Event], found: FoundTerms = FOUND, alone_mm: float = 0.462
+) -> tuple[events.Event, ...]:
+    """The events of a calibration, had it found this; without it ``alone_mm`` of error would be left."""
     changed, update = [], dict[str, object]()
     for event in history:
         match event:
@@ -45,7 +47,7 @@ def told(history: Iterable[events.Event], found: FoundTerms = FOUND) -> tuple[ev
             case events.ResultValidated(
                 verification=Verification(accuracy=VerifiedAccuracy() as accuracy) as verified
             ):
-                alone = accuracy.position.model_copy(update={"value": 0.462, "expanded": 0.441})
+                alone = accuracy.position.model_copy(update={"value": alone_mm, "expanded": 0.441})
                 accuracy = accuracy.model_copy(update={"alone": alone})
                 update = {"verification": verified.model_copy(update={"accuracy": accuracy})}
             case _:
@@ -72,6 +74,8 @@ def test_a_run_says_what_that_gained_and_nothing_where_nothing_was_found(history
     assert said.startswith(found_sentence(FOUND))
     assert "30.8 mm with the config before, 0.462 +- 0.441 mm with the best geometry alone, 0.0" in said
     assert said.endswith(" mm with the new config.")
+    by_side = run_terms_text(fold(told(history, alone_mm=0.0)))
+    assert "30.8 mm with the config before, up to 0.441 mm with the best geometry alone, 0.0" in by_side
     assert run_terms_text(fold(history)) == ""
     expected = improvement_sentence(ExpectedImprovement(now_mm=1.2, expanded_mm=0.1))
     assert expected.endswith("1.2 mm with the current config, 0 +- 0.100 mm with this one.")

@@ -183,9 +183,10 @@ def improvement_sentence(
     if verified is not None:
         before, after = "the config before", f"{verified.position.with_u('mm')} with the new config"
         if (alone := verified.alone) is not None:
-            # What goes by the side of arrival leaves the geometry right, and is all in U.
-            is_by_side = alone.expanded is not None and alone.value < NO_ERROR_SHARE * alone.expanded
-            size = f"up to {shown(alone.expanded)}" if is_by_side else alone.with_u("mm")
+            size, expanded = alone.with_u("mm"), alone.expanded
+            if expanded is not None and alone.value < NO_ERROR_SHARE * expanded:
+                # What goes by the side of arrival leaves the geometry right, and is all in U.
+                size = f"up to {shown(expanded)}"
             after = f"{size} with the best geometry alone, {after}"
     return f"Largest position error at the task poses: {now} with {before}, {after}."
 

@@ -152,7 +152,7 @@ class RunState:
 
     @property
     def refused(self) -> RefusedCommands:
-        """The commands that the controller refused in this run, and those at which the ball left its plates."""
+        """What the controller refused in this run, and where the ball left its plates."""
         by_controller = (RefusedCommand(one.pose, one.axis, one.is_highest) for one in self.excluded)
         return RefusedCommands(tuple(by_controller), self.off_plate)
 

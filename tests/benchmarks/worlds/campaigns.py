@@ -8,7 +8,11 @@ import numpy as np
 from hexacell.campaign.forecast import select_sets
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.loader import Cell
-from hexacell.design.candidates import orientations, reachable
+from hexacell.design.arrival_sides import SIDES, WORTH_A_MOVE
+from hexacell.design.candidates import orientations, outcomes_of, reachable
+from hexacell.design.criteria import D_OPTIMAL, covariance_update
+from hexacell.design.predicted_records import position_derivatives
+from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.term_estimates import TermEstimates
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
@@ -88,24 +92,49 @@ def setting(number: int, candidates: int = 64, terms: tuple[str, ...] = ()) -> S
         PoseBatch.of(Pose(*point) for point in cell.settings.identification.points)
     ).positions
     random = np.random.default_rng([17, number])
-    parts, labels = [], []
+    parts, labels, sides = [], [], []
     for point, chosen in enumerate(select_sets(belief, points, RECORDS + 4, 1, candidates), start=1):
         aimed = chosen.positions + random.uniform(-AIM_MM, AIM_MM, chosen.positions.shape)
         _, commands = reachable(belief, PoseBatch(aimed, chosen.rotations))
         if len(commands) < RECORDS:
             raise UnreachableError(f"robot {number} takes {len(commands)} poses at point {point}")
         parts.append(commands[:RECORDS])
+        sides.append(_best_sides(belief, commands[:RECORDS]))
         labels += [(point, turn) for turn in range(1, RECORDS + 1)]
     task = Task.of(cell.settings, robot, belief)
     return Setting(
         cell,
         robot,
         truth,
-        Commands(PoseBatch.joined(parts), np.array(labels)),
+        Commands(PoseBatch.joined(parts), np.array(labels), np.concatenate(sides)),
         task,
         _held_out(cell, belief, robot, HELD_OUT_SEED + number),
         _held_out(cell, belief, robot, CONFIRMING_SEED + number),
     )
+
+
+def _best_sides(belief: RobotBelief, commands: PoseBatch) -> Array:
+    """The sides (n, 6) from which joints arrive over waypoints, as a run chooses them; 0 for none."""
+    targets, _ = outcomes_of(belief, commands)
+    sides = np.zeros_like(targets.joints)
+    if belief.terms is None or not any(term.needs_directions for term in belief.terms.terms):
+        return sides
+    came, covariance = np.sign(np.diff(targets.joints, axis=0, prepend=0.0)), belief.joint_covariance
+    noise = belief.noise.record_covariance(position_derivatives(belief, targets[:1])[1])
+    first = position_derivatives(belief, targets[:1], came[:1])[0]
+    for row in range(1, len(sides)):
+        ways = np.concatenate([came[[row]], SIDES])
+        there = targets[np.full(len(ways), row)]
+        changes, by_joints = position_derivatives(belief, there, ways)
+        changes, scatter = changes - first, noise + belief.noise.record_covariance(by_joints)
+        gains = D_OPTIMAL.gain(covariance, changes, scatter)
+        best = int(np.argmax(gains))
+        if gains[best] >= WORTH_A_MOVE * gains[0]:
+            sides[row] = ways[best]
+        else:
+            best = 0
+        covariance = covariance_update(covariance, changes[best], scatter[best])
+    return sides
 
 
 def _held_out(cell: Cell, belief, robot: Robot, seed: int) -> Commands:

@@ -28,6 +28,7 @@ class Stops:
         previous: which of these stops the machine comes from (n,).
         seed: of what is random at these stops.
         at_work: whether the robot is at work, and nothing is measured.
+        sides: from which sides sliders come over a waypoint (n, 6), 1 or -1; 0 for straight. None: all do.
     """
 
     points: NDArray[np.intp]
@@ -36,6 +37,7 @@ class Stops:
     previous: NDArray[np.intp]
     seed: tuple[int, ...] = ()
     at_work: bool = False
+    sides: Array | None = None
 
     @classmethod
     def of(cls, points: NDArray[np.intp], joints: Array, start: float, seed: tuple[int, ...]) -> Stops:
@@ -50,12 +52,13 @@ class Stops:
     def __getitem__(self, rows: NDArray[np.intp]) -> Stops:
         """Some of them, as if each came from itself: what is left to ask of them has been computed."""
         parts = self.points[rows], self.hours[rows], self.joints[rows], np.arange(len(rows))
-        return Stops(*parts, self.seed, self.at_work)
+        return Stops(*parts, self.seed, self.at_work, None if self.sides is None else self.sides[rows])
 
     @property
     def directions(self) -> Array:
         """Whether each slider came from below, 1, or from above, -1 (n, 6)."""
-        return np.where(self.joints < self.joints[self.previous], -1.0, 1.0)
+        straight = np.where(self.joints < self.joints[self.previous], -1.0, 1.0)
+        return straight if self.sides is None else np.where(self.sides == 0.0, straight, self.sides)
 
     def of_effect(self, number: int) -> Stops:
         """The same with a random sequence of its own."""

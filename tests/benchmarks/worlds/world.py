@@ -36,10 +36,14 @@ DRAWS = 32
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Commands:
-    """Commands in the convention's frames, and point and orientation (n, 2) of each, counted from 1."""
+    """Commands in the convention's frames, and point and orientation (n, 2) of each, counted from 1.
+
+    ``sides`` (n, 6): see :class:`~tests.benchmarks.worlds.effects.Stops`.
+    """
 
     poses: PoseBatch
     labels: NDArray[np.int_]
+    sides: Array | None = None
 
     @property
     def points(self) -> NDArray[np.intp]:
@@ -162,7 +166,8 @@ class World:
 
     def _stops(self, commands: Commands, commanding: Geometry, start: float) -> Stops:
         joints = slider_places(commanding, self.robot.branch, commands.poses)
-        return Stops.of(commands.points, joints, start, (self.seed, 0, int(1e3 * start)))
+        stops = Stops.of(commands.points, joints, start, (self.seed, 0, int(1e3 * start)))
+        return replace(stops, sides=commands.sides)
 
     def _corrected(self, stops: Stops, poses: PoseBatch) -> Stops:
         """The stops of a controller that corrects what is not geometry."""

@@ -144,7 +144,9 @@ async def test_a_controller_that_refuses_one_pose_after_another_ends_the_run(mak
 async def test_a_pose_on_the_way_to_which_the_ball_left_its_plates_is_not_chosen_again(make_rig) -> None:
     """The robot is not where the estimate holds it for, so that the same choice would fail as often."""
     rig = make_rig()
-    off_plate = Trip(Guard.PLATE, "gauge y", "the ball is +5.53 mm from its reference", "Look at it").as_error()
+    off_plate = Trip(
+        Guard.PLATE, "gauge y", "the ball is +5.53 mm from its reference", "Look at it"
+    ).as_error()
     struck = failing("P2/o03/move", lambda: rig.controller.failures.update(move=off_plate))
     await run_until(rig, events.SetClosed, struck, count=2, policy=UNATTENDED)
     (failed,) = happened(rig, events.Failed)

@@ -88,7 +88,7 @@ def select_pose(
     search = _PathSearch(TravelConstraint(belief, zero), planner)
     for ranked in _batches(np.arange(len(candidates)), *COMMAND_BATCHES):
         commands, found = commands_for(belief, candidates.records.targets[ranked])
-        found &= belief.refused.suit(commands, belief.limits.frames)
+        found &= belief.refused.allow(commands, belief.limits.frames, to_measure=True)
         rows = ranked[found]
         if selected := search.first_safe(candidates.records[rows], commands[found], candidates.gains[rows]):
             return selected
@@ -107,7 +107,7 @@ def select_from_list(
         LimitError: none of them does.
     """
     belief = planner.belief
-    commands = commands[belief.refused.suit(commands, belief.limits.frames)]
+    commands = commands[belief.refused.allow(commands, belief.limits.frames, to_measure=True)]
     targets, rows = outcomes_of(belief, commands)
     records = predict_records(belief, zero, targets)
     inside = np.flatnonzero(records.within(belief.limits))[skipped:]

@@ -43,6 +43,7 @@ class RefusedCommand:
         is_highest: whether that limit is the axis' highest value, not its lowest.
         within_mm, within_deg: commands that are as near as both are concerned as well, unless
             ``within_deg`` is zero.
+        may_be_passed: it is refused as a place to measure at alone.
     """
 
     pose: tuple[float, float, float, float, float, float]
@@ -50,6 +51,7 @@ class RefusedCommand:
     is_highest: bool = True
     within_mm: float = 0.0
     within_deg: float = 0.0
+    may_be_passed: bool = False
 
     def concerns(self, poses: PoseBatch) -> Mask:
         """Which of n commands, in the controller's frames, are this one, near it, or as far out."""
@@ -69,28 +71,18 @@ class RefusedCommand:
 
 @dataclass(frozen=True, slots=True)
 class RefusedCommands:
-    """All commands that are not given; none at first.
-
-    Attributes:
-        unsuitable: those that may be passed, and at which nothing is measured.
-    """
+    """All commands that are not given; none at first."""
 
     commands: tuple[RefusedCommand, ...] = ()
-    unsuitable: tuple[RefusedCommand, ...] = ()
 
     def __or__(self, others: "RefusedCommands") -> "RefusedCommands":
         """These commands and others, each once."""
-        return RefusedCommands(
-            tuple(dict.fromkeys((*self.commands, *others.commands))),
-            tuple(dict.fromkeys((*self.unsuitable, *others.unsuitable))),
-        )
+        return RefusedCommands(tuple(dict.fromkeys((*self.commands, *others.commands))))
 
-    def suit(self, poses: PoseBatch, frames: FrameTransform | None = None) -> Mask:
-        """At which of n commands something may be measured, see :meth:`allow`."""
-        return RefusedCommands(self.commands + self.unsuitable).allow(poses, frames)
-
-    def allow(self, poses: PoseBatch, frames: FrameTransform | None = None) -> Mask:
-        """Which of n commands no refusal concerns.
+    def allow(
+        self, poses: PoseBatch, frames: FrameTransform | None = None, *, to_measure: bool = False
+    ) -> Mask:
+        """Which of n commands no refusal concerns; ``to_measure``: not only to pass them.
 
         They are in the controller's frames, or in those that ``frames`` leads to from there.
         """
@@ -99,7 +91,8 @@ class RefusedCommands:
             return allowed
         commands = poses if frames is None else frames.inverse().poses(poses)
         for refused in self.commands:
-            allowed &= ~refused.concerns(commands)
+            if to_measure or not refused.may_be_passed:
+                allowed &= ~refused.concerns(commands)
         return allowed
 
     def allows(self, pose: tuple[float, float, float, float, float, float]) -> bool:

@@ -109,7 +109,7 @@ class Allowances:
         readings_covariance = 2.0 * noise.record_covariance(ball.by_joints[None])[0]
         covariance = readings_covariance + ball.covariance(joints)
         is_fixed = self.settings.guards.limits == "fixed"
-        explicable = SIGMAS * np.sqrt(np.diag(covariance) + readings * noise.walk_mm**2)
+        explicable = SIGMAS * np.sqrt(np.diag(covariance) + readings * noise.walk.step_mm**2)
         unknown = np.zeros(LEGS) if unknown is None else unknown
         explicable = explicable + np.abs(ball.by_joints) @ unknown
         chance = float(np.sqrt(2.0)) * self.stop_sigmas * np.hypot(noise.encoders, self.stops) + unknown
@@ -125,7 +125,7 @@ class Allowances:
             by_joints=ball.by_joints,
             chance_joints=chance if is_known else np.full(LEGS, np.inf),
             at_rest=readings_covariance + ball.covariance(joints - np.diag(joints)),
-            walk_mm=noise.walk_mm,
+            walk_mm=noise.walk.step_mm,
         )
 
     def between_visits(self, reference: Pose, visits: Array) -> "tuple[ReferenceChange, ...]":
@@ -210,6 +210,11 @@ class ReferenceChange:
     at_rest: Array = field(default_factory=lambda: np.zeros((LEGS, 3, 3)))
     walk_mm: float = 0.0
 
+    @property
+    def by_drift(self) -> Array:
+        """The covariance (3, 3), mm^2, by which the known drift of the gauges adds to ``covariance``."""
+        return np.asarray(self.readings * self.walk_mm**2 * np.eye(3))
+
     def exceeds(self, limit_mm: float) -> bool:
         """Whether a gauge shows more than a limit, and more than is explicable."""
         return bool((np.abs(self.unexplained_mm) > np.maximum(limit_mm, self.explicable_mm)).any())
@@ -225,7 +230,7 @@ class ReferenceChange:
         A joint that stopped elsewhere takes the ball along, as far as the geometry is known. Where only the
         encoder changed, the gauges lack exactly the share of that joint: the likelihoods are compared.
         """
-        drift = self.readings * self.walk_mm**2 * np.eye(3)
+        drift = self.by_drift
 
         def unlikelihood(unexplained: Array, covariance: Array) -> float:
             whole = covariance + drift

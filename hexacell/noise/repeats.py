@@ -76,14 +76,12 @@ class Repeats:
         is_measured: whether that noise was measured by some of them, not stated.
         seen_freedom: degrees of freedom of the stops that the encoders show.
         residuals: of a fit with that noise; None without one.
-        walk_mm: the drift from one reading to the next that it has.
     """
 
     changes: tuple[ReferenceChange, ...]
     is_measured: bool = False
     seen_freedom: float = np.inf
     residuals: ChiSquareTest | None = None
-    walk_mm: float = 0.0
 
     @classmethod
     def of(
@@ -98,7 +96,7 @@ class Repeats:
         is_measured = approaches is not None and approaches.source is not None
         is_of_fit = found is not None and found.problem.noise.encoder <= noise.encoder * (1.0 + 1e-6)
         goodness = found.goodness if found and is_of_fit else None
-        return cls(tuple(changes), is_measured, seen, goodness, noise.walk_mm)
+        return cls(tuple(changes), is_measured, seen, goodness)
 
     @property
     def freedom(self) -> float:
@@ -201,5 +199,4 @@ class Repeats:
 
     @cached_property
     def _covariances(self) -> Array:
-        by_drift = np.array([one.readings * self.walk_mm**2 for one in self.changes])
-        return np.stack([one.covariance for one in self.changes]) + by_drift[:, None, None] * np.eye(3)
+        return np.stack([one.covariance + one.by_drift for one in self.changes])

@@ -54,7 +54,7 @@ def worsening_of(changes: Sequence[ReferenceChange], ends: int, noise: Noise) ->
     later = ends - ends // 2
     if ends - later < FEWEST:
         return None
-    by_noise = [one.covariance + one.readings * noise.walk_mm**2 * np.eye(3) for one in changes]
+    by_noise = [one.covariance + one.by_drift for one in changes]
     joints, beside = np.array([one.joints for one in changes]), [one.unexplained_mm for one in changes]
     of_noise = np.linalg.solve(np.linalg.cholesky(by_noise), np.array(beside)[..., None])[..., 0]
     kinds = {True: joints / (np.sqrt(2.0) * noise.encoders), False: of_noise}

@@ -14,6 +14,7 @@ from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
 from hexacell.errors import FileError, HexacellError, UsageError, joined
 from hexacell.identification.identified_zeros import ParameterChoice
+from hexacell.identification.problem.random_walk import NO_WALK
 from hexacell.identification.thermal_expansion import known_parts
 from hexacell.measurements.records import MeasurementSet, RecordId
 from hexacell.robot.model import robot_of
@@ -98,14 +99,14 @@ def fit_measurements(
             measured = run.noise.noise
             settings = with_measured_noise(settings, measured)
             robot = robot.with_errors_of(settings)
-        robot = replace(robot, noise=replace(robot.noise, walk_mm=run.walk_mm, walk_s=run.walk_s))
+        robot = replace(robot, noise=replace(robot.noise, walk=run.walk))
     known = known_parts(one.temperatures for one in measurements.records)
     robot = replace(robot, effects=stated_effects(settings, known=known))
     if identify_only is not None:
         robot = replace(robot, identifies=identify_only)
     found = identify(robot.problem(measurements))
-    if robot.noise.walk_mm and not found.goodness.is_explained:  # no drift explains it: as in the run
-        robot = replace(robot, noise=replace(robot.noise, walk_mm=0.0))
+    if robot.noise.walk.step_mm and not found.goodness.is_explained:  # no drift explains it: as in the run
+        robot = replace(robot, noise=replace(robot.noise, walk=NO_WALK))
         found = identify(robot.problem(measurements))
     return assess(settings, robot, measurements, found, measured_noise=measured)
 

@@ -24,6 +24,7 @@ from hexacell.errors import IdentifiabilityError
 from hexacell.identification.estimator import identify
 from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.identification.problem.prior import IdentifiedBefore
+from hexacell.identification.problem.random_walk import NO_WALK, GaugeWalk
 from hexacell.identification.solver.result import Identification
 from hexacell.identification.thermal_expansion import known_parts
 from hexacell.kinematics.commanded_motion import RefusedCommands
@@ -88,8 +89,7 @@ class Calibration:
             None if proposed is None else tuple(vector(proposed.written).tolist()),
             None if proposed is None else proposed.corrections,
             state.committed is not None,
-            state.walk_mm,
-            state.walk_s,
+            state.walk,
         )
 
     @cached_property
@@ -142,7 +142,7 @@ class Knowledge:
             mechanism's frame convention; ``is_lent``: it has it now.
         written: parameters of the proposed geometry, in the controller's frames, with the ``corrections``
             that are proposed beside it; ``is_committed``: the controller has it.
-        walk_mm: how far the gauges drift from one reading to the next; ``walk_s``: in what time, if known.
+        walk: how the gauges drift.
     """
 
     calibration: Calibration
@@ -153,8 +153,7 @@ class Knowledge:
     written: tuple[float, ...] | None = None
     corrections: Corrections | None = None
     is_committed: bool = False
-    walk_mm: float = 0.0
-    walk_s: float = 0.0
+    walk: GaugeWalk = NO_WALK
 
     @cached_property
     def settings(self) -> CellSettings:
@@ -248,9 +247,9 @@ class Knowledge:
         except IdentifiabilityError:  # too few by now
             return first
         measured = self._as_measured(robot, state, found)
-        if self.walk_mm and not identify(measured.problem(state.measurements())).goodness.is_explained:
+        if self.walk.step_mm and not identify(measured.problem(state.measurements())).goodness.is_explained:
             # What does not repeat otherwise has seemed a drift.
-            return replace(self, walk_mm=0.0)._measured(robot, state)
+            return replace(self, walk=NO_WALK)._measured(robot, state)
         return measured
 
     def _as_measured(self, robot: Robot, state: RunState, found: Identification | None = None) -> Robot:
@@ -260,7 +259,7 @@ class Knowledge:
         """
         noise, settings = self.noise, self.settings
         if noise is not None and found is not None:
-            noise = noise_again(self.calibration.plan, state, found, self.walk_mm, self.walk_s) or noise
+            noise = noise_again(self.calibration.plan, state, found, self.walk) or noise
             settings = with_measured_noise(self.calibration.settings, noise)
             robot = replace(robot, noise=noise_of(settings))
         robot = replace(robot, expansion=robot.expansion.referred_to(state.measurements()))
@@ -277,7 +276,7 @@ class Knowledge:
         return Repeats.of(noise.approaches, [*changes], robot.noise, found).applied_to_robot(robot)
 
     def _drifting(self, robot: Robot) -> Robot:
-        return replace(robot, noise=replace(robot.noise, walk_mm=self.walk_mm, walk_s=self.walk_s))
+        return replace(robot, noise=replace(robot.noise, walk=self.walk))
 
     def provisional_geometry(self, state: RunState) -> Geometry:
         """The estimate by now, or the provisional geometry that the run applied before an interruption.

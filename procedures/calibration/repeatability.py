@@ -11,6 +11,7 @@ import numpy as np
 
 from hexacell.campaign.planner import Plan
 from hexacell.cell.devices import EncoderSettings
+from hexacell.identification.problem.random_walk import NO_WALK, GaugeWalk
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.corrections import CorrectionKind
 from hexacell.kinematics.parameters import LEGS
@@ -86,15 +87,15 @@ def since_zero(allowances: Allowances, measured: SetState, now: Reading) -> Refe
     reference = Pose(*zero.pose)
     before, after = (_gauges_and_joints(one, reference, allowances) for one in (zero.reading, now))
     unknown = _on_unknown_sides(zero.reading, allowances) + _on_unknown_sides(now, allowances)
-    readings = readings_between(zero.reading, now, measured.readings, allowances.robot.noise.walk_s)
+    readings = readings_between(zero.reading, now, measured.readings, allowances.robot.noise.walk)
     return allowances.since(reference, before, after, unknown, readings)
 
 
-def readings_between(before: Reading, after: Reading, counted: float, walk_s: float) -> float:
-    """How many readings later one was taken, or in the mean time ``walk_s`` of how many, if it is known."""
-    if walk_s <= 0.0 or before.at_s is None or after.at_s is None:
+def readings_between(before: Reading, after: Reading, counted: float, walk: GaugeWalk) -> float:
+    """How many readings later one was taken, or in the mean interval of how many, if it is known."""
+    if walk.interval_s <= 0.0 or before.at_s is None or after.at_s is None:
         return counted
-    return max(0.0, after.at_s - before.at_s) / walk_s
+    return max(0.0, after.at_s - before.at_s) / walk.interval_s
 
 
 def _on_unknown_sides(reading: Reading, allowances: Allowances) -> Array:
@@ -110,7 +111,7 @@ def repeated_readings(state: RunState, plan: Plan, allowances: Allowances) -> It
 
     Where gauges are known to drift, the visits are left out: how far they did then is not in their changes.
     """
-    is_drifting = allowances.robot.noise.walk_mm > 0.0
+    is_drifting = allowances.robot.noise.walk.step_mm > 0.0
     if not is_drifting and (visits := _visits(plan, state, allowances)) is not None:
         yield from allowances.between_visits(visits.reference, visits.visits)
     for key, one in state.sets.items():
@@ -120,22 +121,19 @@ def repeated_readings(state: RunState, plan: Plan, allowances: Allowances) -> It
             yield since_zero(allowances, one, one.closing)
 
 
-def drift_by_repeats(plan: Plan, state: RunState, allowances: Allowances) -> tuple[float, float]:
-    """How far the gauges drift from one reading to the next, mm (1 sigma), and in what time, s, if known.
+def drift_by_repeats(plan: Plan, state: RunState, allowances: Allowances) -> GaugeWalk:
+    """How the gauges drift; nothing unless it is significant.
 
-    Both are 0 unless it is significant. What was measured of the noise contains the drift between the
-    visits: what is stated does not.
+    What was measured of the noise contains the drift between the visits: what is stated does not.
     """
-    walk_s = _mean_interval_s(state)
+    walk = GaugeWalk(interval_s=_mean_interval_s(state))
     measured, stated = (
-        replace(
-            allowances, robot=replace(allowances.robot, noise=replace(noise, walk_mm=0.0, walk_s=walk_s))
-        )
+        replace(allowances, robot=replace(allowances.robot, noise=replace(noise, walk=walk)))
         for noise in (allowances.robot.noise, plan.robot.noise)
     )
     if not Repeats(tuple(repeated_readings(state, plan, measured))).show_drift(measured.robot.noise):
-        return 0.0, 0.0
-    return Repeats(tuple(repeated_readings(state, plan, stated))).drift_mm, walk_s
+        return NO_WALK
+    return walk._replace(step_mm=Repeats(tuple(repeated_readings(state, plan, stated))).drift_mm)
 
 
 def _mean_interval_s(state: RunState) -> float:
@@ -148,7 +146,7 @@ def _mean_interval_s(state: RunState) -> float:
 
 
 def noise_again(
-    plan: Plan, state: RunState, found: Identification, walk_mm: float = 0.0, walk_s: float = 0.0
+    plan: Plan, state: RunState, found: Identification, walk: GaugeWalk
 ) -> MeasuredNoise | None:
     """The measured noise by the visits, with the geometry that was identified; None without."""
     allowances = Allowances(plan.settings, plan.robot, is_measured=True, found=found)
@@ -159,8 +157,8 @@ def noise_again(
     counted = len(visited.visits) + len(visited.pilots)
     every = [one.reading for one in visited.samples[:1]] + [one.reading for one in visited.visits]
     every.sort(key=lambda one: one.at_s or 0.0)
-    steps = readings_between(every[0], every[-1], counted, walk_s) / 6.0 if every else 0.0
-    return assess_again(plan, visits, state.noise.noise, found, walk_mm * float(np.sqrt(steps)))
+    steps = readings_between(every[0], every[-1], counted, walk) / 6.0 if every else 0.0
+    return assess_again(plan, visits, state.noise.noise, found, walk.step_mm * float(np.sqrt(steps)))
 
 
 def _visits(plan: Plan, state: RunState, allowances: Allowances) -> NoiseReadings | None:
@@ -174,10 +172,10 @@ def _visits(plan: Plan, state: RunState, allowances: Allowances) -> NoiseReading
 
 
 def worsening_by_repeats(
-    plan: Plan, state: RunState, found: Identification, walk_mm: float
+    plan: Plan, state: RunState, found: Identification, walk: GaugeWalk
 ) -> Worsening | None:
     """What got worse from the first visits of a reference to the ends of the last sets, if anything did."""
-    robot = replace(plan.robot, noise=replace(plan.robot.noise, walk_mm=walk_mm))
+    robot = replace(plan.robot, noise=replace(plan.robot.noise, walk=walk))
     allowances = Allowances(plan.settings, robot, is_measured=True, found=found)
     changes = [*repeated_readings(state, plan, allowances)]
     return worsening_of(changes, sum(one.readings > 0 for one in changes), robot.noise)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hexacell.campaign.pilots import FIRST_REPEAT
+from hexacell.identification.problem.random_walk import NO_WALK, GaugeWalk
 from hexacell.measurements.records import Record, deviation_of
 from procedures.run.keys import SixNumbers
 from procedures.run.readings import Reading
@@ -25,8 +26,7 @@ class SetState:
         samples: those that count, in the order taken; the first is the reference.
         again: orientations and poses of discarded records, which are taken again.
         closing: what was read at the reference at the end.
-        walk_mm: how far the gauges drift from one reading to the next, by all sets until then; ``walk_s``:
-            in what time, if it is known.
+        walk: how the gauges drift, by all sets until then.
         reference_unverified: the gauges were unwatched; their zero must be verified at the reference.
         standstill: readings at the reference without moving, and ``visits`` of it.
         has_left: the robot has been elsewhere since it was read last.
@@ -41,8 +41,7 @@ class SetState:
     rejections: int = 0
     drift_mm: tuple[float, float, float] | None = None
     closing: Reading | None = None
-    walk_mm: float = 0.0
-    walk_s: float = 0.0
+    walk: GaugeWalk = NO_WALK
     again: tuple[tuple[int, SixNumbers], ...] = ()
     reference_unverified: bool = False
     standstill: events.StandstillRead | None = None

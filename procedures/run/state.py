@@ -11,6 +11,7 @@ from functools import reduce
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from hexacell.cell.recovery import FailureKind
+from hexacell.identification.problem.random_walk import NO_WALK, GaugeWalk
 from hexacell.kinematics.commanded_motion import RefusedCommand, RefusedCommands
 from hexacell.kinematics.corrections import NO_CORRECTIONS
 from hexacell.measurements.records import Directions, MeasurementSet, Record
@@ -154,7 +155,7 @@ class RunState:
     def refused(self) -> RefusedCommands:
         """What the controller refused in this run, and where the ball left its plates."""
         by_controller = (RefusedCommand(one.pose, one.axis, one.is_highest) for one in self.excluded)
-        return RefusedCommands(tuple(by_controller), self.off_plate)
+        return RefusedCommands((*by_controller, *self.off_plate))
 
     def is_left(self, key: SetKey) -> bool:
         """Whether a set cannot be measured, because its reference was refused."""
@@ -173,7 +174,7 @@ class RunState:
 
     def measurements(self) -> MeasurementSet:
         """The records that the geometry is identified from; where gauges drift, with references again."""
-        if not self.walk_mm:
+        if not self.walk.step_mm:
             return MeasurementSet(tuple(sample.record for sample in self.samples(Phase.IDENTIFY)))
         keys = sorted((key for key in self.sets if key.phase is Phase.IDENTIFY), key=lambda key: key.point)
         measured = [(key, self.sets[key]) for key in keys if self.sets[key].samples]
@@ -182,20 +183,11 @@ class RunState:
         )
 
     @property
-    def walk_mm(self) -> float:
-        """How far the gauges drift from one reading to the next, mm (1 sigma); 0 unless significant."""
-        return self._last_closed.walk_mm
-
-    @property
-    def walk_s(self) -> float:
-        """The mean time from one reading to the next, s, by which that drift goes; 0: by their number."""
-        return self._last_closed.walk_s
-
-    @property
-    def _last_closed(self) -> SetState:
+    def walk(self) -> GaugeWalk:
+        """How the gauges drift, by the set that was closed last."""
         sets = self.sets.items()
-        closed = [one for key, one in sets if key.phase is Phase.IDENTIFY and one.closed]
-        return closed[-1] if closed else SetState()
+        closed = [one.walk for key, one in sets if key.phase is Phase.IDENTIFY and one.closed]
+        return closed[-1] if closed else NO_WALK
 
     def _visits_of(self, key: SetKey) -> tuple[Reading, ...]:
         """The visits of a set's reference after its first record, if that was not taken again then."""

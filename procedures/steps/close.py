@@ -4,6 +4,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from hexacell.identification.problem.random_walk import GaugeWalk
 from hexacell.lengths import unit_of
 from hexacell.measurements.records import deviation_of
 from hexacell.noise.allowances import ReferenceChange
@@ -38,8 +39,8 @@ class SetClosed(EventOfSet):
     walk_s: float = 0.0
 
     def applied_to(self, state: RunState) -> RunState:
-        walk = {"walk_mm": self.walk_mm, "walk_s": self.walk_s}
-        return state.with_changed_set(self.at, drift_mm=self.drift_mm, closing=self.reading, **walk)
+        walk = GaugeWalk(self.walk_mm, self.walk_s)
+        return state.with_changed_set(self.at, drift_mm=self.drift_mm, closing=self.reading, walk=walk)
 
     def text(self, state: RunState) -> str:
         samples = state.set(self.at).samples
@@ -47,7 +48,7 @@ class SetClosed(EventOfSet):
         drift = float(np.abs(self.drift_mm).max())
         unit = unit_of(largest, drift)
         end = f"\n{self.at.name} ends with {len(samples)} records: {self.reason}" if self.reason else ""
-        if self.walk_mm and sum(one.walk_mm > 0.0 for one in state.sets.values()) == 1:
+        if self.walk_mm and sum(one.walk.step_mm > 0.0 for one in state.sets.values()) == 1:
             end += DRIFTS.format(um=1e3 * self.walk_mm)
         return (
             f"{self.at.name:24} {len(samples):2} records, "
@@ -77,11 +78,11 @@ class CloseSet(StepOfSet):
             raise trip.as_error()  # not latched, as nothing moved
         drift_mm = deviation_of(change.unexplained_mm)
         closed = SetClosed(at=self.at, drift_mm=drift_mm, reading=reading, reason=self.reason)
-        walk = state.walk_mm, state.walk_s
+        walk = state.walk
         if self.at.phase is Phase.IDENTIFY:
             after, known = closed.applied_to(state), run.calibration.known(state)
             walk = drift_by_repeats(run.calibration.plan, after, known.allowances)
-        return closed.model_copy(update=dict(zip(("walk_mm", "walk_s"), walk, strict=True)))
+        return closed.model_copy(update={"walk_mm": walk.step_mm, "walk_s": walk.interval_s})
 
 
 def reference_drift(point: str, change: ReferenceChange, limit_mm: float) -> Trip | None:

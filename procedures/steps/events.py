@@ -227,7 +227,7 @@ class Failed(BaseEvent):
         is_redone, is_off_plate = self.action is Action.REDO_SET, self.failure is FailureKind.GAUGE_AT_END
         match self.step:
             case Move(at=at, pose=pose) if is_off_plate and is_redone and at.phase is Phase.IDENTIFY:
-                near = RefusedCommand(pose, within_mm=NEAR_MM, within_deg=NEAR_DEG)
+                near = RefusedCommand(pose, within_mm=NEAR_MM, within_deg=NEAR_DEG, may_be_passed=True)
                 counted = replace(counted, off_plate=(*counted.off_plate, near))
             case Move(at=at, orientation=orientation) if is_off_plate and at.phase is Phase.IDENTIFY:
                 counted = counted.with_set(at, counted.set(at).with_rejection(orientation))

@@ -69,7 +69,7 @@ class Identify(Computation):
             improvement=assessed.improvement,
             quick=known.quick.accuracy(measurements) if is_quick else None,
             reversal=reversal_by_repeats(known.plan, state, identified),
-            worsening=worsening_by_repeats(known.plan, state, identified, robot.noise.walk_mm),
+            worsening=worsening_by_repeats(known.plan, state, identified, robot.noise.walk),
         )
 
 

@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from hexacell.identification.placement import RecordPlacement
+from hexacell.identification.problem.random_walk import NO_WALK, GaugeWalk
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism, free_parameter_derivatives
 from hexacell.kinematics.parameters import LEGS, ParameterSet, ParameterUnit
@@ -34,9 +35,7 @@ class Noise:
         gauge_shares: of each gauge, x, y, z, in units of ``gauge_mm``.
         stops: of where a joint stops beside its command, as its encoder shows it: no noise of a record, but
             it moves the ball.
-        walk_mm: of what the gauges' zero drifts along each axis from one reading at a point to the next;
-            zero unless the references that were read again show it.
-        walk_s: the mean time from one to the next, s, by which it goes; zero: it goes by their number.
+        walk: of the gauges' zero.
         freedom: degrees of freedom with which all this was measured; infinite where it is stated.
         gauge_axes: rows of the matrix whose columns are the gauges' directions in the frame convention;
             empty where all gauges are alike, or along its axes.
@@ -50,8 +49,7 @@ class Noise:
     gauge_shares: tuple[float, ...] = ()
     gauge_axes: tuple[tuple[float, ...], ...] = ()
     stops: float = 0.0
-    walk_mm: float = 0.0
-    walk_s: float = 0.0
+    walk: GaugeWalk = NO_WALK
     freedom: float = np.inf
 
     def with_devices(self, encoders: Sequence[float], gauges_mm: Sequence[float]) -> Noise:

@@ -10,26 +10,42 @@ times of all records are known, an increment is by the time that has passed: aft
 Source: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, appendix B.2.1.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from hexacell.kinematics.rotations import Array
 
+
+class GaugeWalk(NamedTuple):
+    """How the gauges' zero drifts.
+
+    Attributes:
+        step_mm: one standard deviation along each axis from one reading at a point to the next; zero unless
+            the references that were read again show it.
+        interval_s: the mean time from one to the next, by which it goes; zero: it goes by their number.
+    """
+
+    step_mm: float = 0.0
+    interval_s: float = 0.0
+
+
+NO_WALK = GaugeWalk()
 TRIAL = 4
 """Steps from a reference to its next record: in between the gauges are tried by three readings."""
 
 
 def walk_columns(
-    first_rows: NDArray[np.intp], records: int, step_mm: float, times: Array | None = None
+    first_rows: NDArray[np.intp], records: int, walk: GaugeWalk, times_s: Array | None = None
 ) -> Array:
     """What one standard deviation of each increment does to each record.
 
     Args:
         first_rows: (m,) row at which each point begins, of records in the order in which they were taken.
         records: their number n.
-        step_mm: one standard deviation along each axis from one reading to the next.
-        times: (n,) when records were taken, in the mean time from one reading to the next; None, or NaN
-            where one is not known: steps are counted.
+        walk: of the gauges' zero.
+        times_s: (n,) when records were taken; None, or NaN where one is not known: steps are counted.
 
     Returns:
         (n, 3, 3 (n - m)), mm.
@@ -39,7 +55,7 @@ def walk_columns(
     point = np.searchsorted(first_rows, rows, side="right")
     is_moved = (point[:, None] == point[later]) & (rows[:, None] >= later)
     steps = np.where(np.isin(later - 1, first_rows), TRIAL, 1.0)
-    if times is not None and np.isfinite(times).all():
-        steps = np.maximum(times[later] - times[later - 1], 0.0)
-    columns: Array = (step_mm * np.sqrt(steps) * is_moved)[:, None, :, None] * np.eye(3)[:, None, :]
+    if walk.interval_s and times_s is not None and np.isfinite(times_s).all():
+        steps = np.maximum(times_s[later] - times_s[later - 1], 0.0) / walk.interval_s
+    columns: Array = (walk.step_mm * np.sqrt(steps) * is_moved)[:, None, :, None] * np.eye(3)[:, None, :]
     return columns.reshape(records, 3, 3 * len(later))

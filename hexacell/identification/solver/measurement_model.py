@@ -174,9 +174,8 @@ class NuisanceElimination:
         if noise.gauge_scale > 0.0:
             designs.append(-problem.gauges * (problem.deviations @ problem.gauges)[:, None, :])
             self._sigmas = np.full(3, noise.gauge_scale)
-        if noise.walk_mm > 0.0 and problem.records > problem.points:
-            times = problem.times_s / noise.walk_s if noise.walk_s > 0.0 else None
-            designs.append(walk_columns(problem.first_rows, problem.records, noise.walk_mm, times))
+        if noise.walk.step_mm > 0.0 and problem.records > problem.points:
+            designs.append(walk_columns(problem.first_rows, problem.records, noise.walk, problem.times_s))
         if problem.terms is not None:
             designs.append(-problem.terms.columns)
         if designs:

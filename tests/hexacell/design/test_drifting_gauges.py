@@ -8,7 +8,7 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.design.candidates import orientations, reachable
 from hexacell.design.predicted_records import position_derivatives
-from hexacell.identification.problem.random_walk import walk_columns
+from hexacell.identification.problem.random_walk import GaugeWalk, walk_columns
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.services.offline import plan_of
@@ -29,7 +29,7 @@ def test_poses_chosen_one_after_the_other_do_not_make_up_for_a_drift(ratio: floa
 
     def information(at: int, rows: list[int], step_mm: float) -> Array:
         rows = [*rows, rows[0]]
-        walk = walk_columns(np.array([0]), len(rows), step_mm).reshape(3 * len(rows), -1)
+        walk = walk_columns(np.array([0]), len(rows), GaugeWalk(step_mm)).reshape(3 * len(rows), -1)
         zero = np.tile(1e4 * np.eye(3), (len(rows), len(rows)))
         jacobian = sets[at][0][rows].reshape(len(zero), -1)
         covariance = block_diag(*noise[at][rows]) + walk @ walk.T + zero

@@ -93,7 +93,12 @@ def test_gauges_that_drift_are_found_with_the_size_of_a_step_which_is_no_noise()
     drawn = [moved(random, 0.03) for _ in range(200)]
     assert np.mean([one.show_drift(NOISE) for one in drawn]) > 0.9
     assert np.sqrt(np.mean([one.drift_mm**2 for one in drawn])) == pytest.approx(0.03, rel=0.05)
-    known = [replace(one, is_measured=True, walk_mm=0.03).applied_to(NOISE).gauge_mm for one in drawn]
+    known = [
+        Repeats(tuple(replace(change, walk_mm=0.03) for change in one.changes), is_measured=True)
+        .applied_to(NOISE)
+        .gauge_mm
+        for one in drawn
+    ]
     assert np.mean([gauge_mm == NOISE.gauge_mm for gauge_mm in known]) > 0.98
 
 

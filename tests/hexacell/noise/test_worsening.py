@@ -33,6 +33,7 @@ def found(
                 covariance=covariance,
                 by_joints=by_joints,
                 readings=10 * (row >= VISITS),
+                by_drift=np.zeros((3, 3)),
             )
         )
     return worsening_of(changes, ENDS, NOISE)

@@ -100,7 +100,7 @@ def test_records_in_a_run_folder_are_weighted_by_the_noise_that_the_run_measured
     assert assessed.measured_noise == noise.noise
     assert "noise                    gauges 10 to 40, encoders 10 um" in identification_report(assessed)
     assert assessed.found.problem.noise.gauges_mm == pytest.approx([0.01, 0.04, 0.01])
-    assert assessed.found.problem.noise.walk_mm == 0.002, "the drift that it found"
+    assert assessed.found.problem.noise.walk.step_mm == 0.002, "the drift that it found"
     alone = fit_measurements(cell, measured)
     assert alone.measured_noise is None
     assert "noise                    gauges" not in identification_report(alone)

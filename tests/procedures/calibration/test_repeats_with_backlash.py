@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from hexacell.identification.estimator import identify
+from hexacell.identification.problem.random_walk import GaugeWalk
 from hexacell.kinematics.corrections import Corrections
 from hexacell.kinematics.pose import Pose
 from hexacell.noise.allowances import SIGMAS, Allowances
@@ -63,7 +64,7 @@ def test_a_reference_reached_from_another_side_is_no_slipped_gauge(allowances: A
 
 
 def test_a_drift_goes_by_the_time_of_the_readings_as_far_as_it_is_known(allowances: Allowances) -> None:
-    noise = replace(allowances.robot.noise, walk_mm=0.01, walk_s=30.0)
+    noise = replace(allowances.robot.noise, walk=GaugeWalk(0.01, 30.0))
     drifting = replace(allowances, robot=replace(allowances.robot, noise=noise))
     zero, pose = reading(np.zeros(3), np.zeros(6), FROM_BELOW), allowances.settings.identification.points[0]
 

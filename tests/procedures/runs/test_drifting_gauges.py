@@ -11,6 +11,7 @@ import pytest
 
 from hexacell.campaign.pilots import FIRST_REPEAT
 from hexacell.errors import Interruption
+from hexacell.identification.problem.random_walk import GaugeWalk
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.csv_file import read_measurements
 from procedures.journal.journal import read_journal
@@ -50,9 +51,9 @@ async def test_they_are_noticed_and_references_read_again_become_records(make_ri
         "a drift explains more"
     )
     found = known.robot_of(state).noise
-    assert found.walk_mm == second.walk_mm
+    assert found.walk == (second.walk_mm, second.walk_s)
     assert found.gauge_mm == pytest.approx(0.0012, rel=0.01), "what drifted between the visits is no noise"
-    denied = replace(known, walk_mm=1e-6).robot_of(state).noise
-    assert denied.walk_mm == 0.0, "residuals that a drift does not explain are of something else"
+    denied = replace(known, walk=GaugeWalk(1e-6)).robot_of(state).noise
+    assert denied.walk.step_mm == 0.0, "residuals that a drift does not explain are of something else"
     report = await asyncio.to_thread(through, rig, history, tmp_path / "again")
     assert report.differences == []

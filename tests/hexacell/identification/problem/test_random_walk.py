@@ -11,7 +11,7 @@ from scipy.linalg import block_diag
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import Noise
 from hexacell.identification.problem.problem import Problem
-from hexacell.identification.problem.random_walk import TRIAL, walk_columns
+from hexacell.identification.problem.random_walk import TRIAL, GaugeWalk, walk_columns
 from hexacell.identification.solver.measurement_model import NuisanceElimination, Prediction, predict
 from hexacell.measurements.records import MeasurementSet, Record
 from tests.hexacell.altered_records import altered
@@ -40,20 +40,22 @@ def linearized(problem: Problem, truth: Any) -> Prediction:
 
 
 def test_it_begins_anew_at_each_point() -> None:
-    columns = walk_columns(np.array([0, 3]), 6, 2.0).reshape(18, -1)
+    columns = walk_columns(np.array([0, 3]), 6, GaugeWalk(2.0)).reshape(18, -1)
     steps = [0, TRIAL, TRIAL + 1]
     walk = np.kron(np.eye(2), np.minimum.outer(steps, steps))
     np.testing.assert_allclose(columns @ columns.T, 4.0 * np.kron(walk, np.eye(3)))
-    assert walk_columns(np.arange(3), 3, 2.0).shape == (3, 3, 0)
+    assert walk_columns(np.arange(3), 3, GaugeWalk(2.0)).shape == (3, 3, 0)
 
 
 def test_it_goes_by_time_where_that_is_known_of_all_records() -> None:
     first_rows, times = np.array([0, 3]), np.array([5.0, 6.0, 66.0, 900.0, 900.5, 903.0])
-    columns = walk_columns(first_rows, 6, 2.0, times).reshape(18, -1)
+    walk = GaugeWalk(2.0, 0.5)
+    columns = walk_columns(first_rows, 6, walk, 0.5 * times).reshape(18, -1)
     apart = [np.minimum.outer(elapsed, elapsed) for elapsed in ([0.0, 1.0, 61.0], [0.0, 0.5, 3.0])]
     np.testing.assert_allclose(columns @ columns.T, 4.0 * np.kron(block_diag(*apart), np.eye(3)))
-    unknown = walk_columns(first_rows, 6, 2.0, np.append(times[:5], np.nan))
-    np.testing.assert_array_equal(unknown, walk_columns(first_rows, 6, 2.0))
+    counted = walk_columns(first_rows, 6, GaugeWalk(2.0))
+    np.testing.assert_array_equal(walk_columns(first_rows, 6, walk, np.append(times[:5], np.nan)), counted)
+    np.testing.assert_array_equal(walk_columns(first_rows, 6, GaugeWalk(2.0), times), counted)
 
 
 def test_by_time_a_walk_with_a_pause_is_estimated_better_than_by_count(visit, make_problem, paper) -> None:
@@ -66,8 +68,8 @@ def test_by_time_a_walk_with_a_pause_is_estimated_better_than_by_count(visit, ma
     walks = np.cumsum(steps * random.standard_normal((5, 12, 3, 400)), axis=1).reshape(60, 3, 400)
     task = linearized(make_problem(visit(seed=9).measured()), paper.actual).jacobian
 
-    def estimated(walk_s: float, walk_mm: float) -> tuple[float, float]:
-        problem = make_problem(timed, noise=replace(QUIET, walk_mm=walk_mm, walk_s=walk_s))
+    def estimated(walk: GaugeWalk) -> tuple[float, float]:
+        problem = make_problem(timed, noise=replace(QUIET, walk=walk))
         found, scatter = linearized(problem, paper.actual), random.standard_normal((60, 3, 400))
         noise = np.linalg.solve(np.swapaxes(np.linalg.cholesky(found.weights), 1, 2), scatter)
         both = np.concatenate([found.jacobian, walks + noise], axis=-1)
@@ -77,7 +79,8 @@ def test_by_time_a_walk_with_a_pause_is_estimated_better_than_by_count(visit, ma
         covered = np.sum((by_free @ error) ** 2, axis=0) / len(error)
         return float(np.sqrt(np.mean((task @ error) ** 2))), float(np.mean(covered))
 
-    by_time, counted = estimated(60.0, step_mm), estimated(0.0, step_mm * np.sqrt(71.0 / 14.0))
+    by_time = estimated(GaugeWalk(step_mm, 60.0))
+    counted = estimated(GaugeWalk(step_mm * np.sqrt(71.0 / 14.0)))
     assert by_time[0] < 0.8 * counted[0]
     assert by_time[1] == pytest.approx(1.0, abs=0.05) != counted[1]
 
@@ -86,7 +89,7 @@ def test_by_time_a_walk_with_a_pause_is_estimated_better_than_by_count(visit, ma
 @pytest.mark.parametrize("ratio", [0.5, 3.0, 10.0])
 def test_the_reference_once_more_gains_less_than_another_record(visit, make_problem, paper, ratio) -> None:
     """However fast it drifts over the noise: so a set has none in its middle, and is not longer."""
-    noise = replace(QUIET, walk_mm=ratio * QUIET.gauge_mm)
+    noise = replace(QUIET, walk=GaugeWalk(ratio * QUIET.gauge_mm))
     measured = visit(seed=2, orientations=13).measured()
     task = linearized(make_problem(visit(seed=9).measured()), paper.actual).jacobian
 
@@ -118,7 +121,8 @@ def test_machines_whose_gauges_drift_are_identified_twice_as_well_and_within_u(v
         )
         if not walk_mm:
             shown = MeasurementSet(tuple(one for one in shown.records if one.orientation != AGAIN))
-        found = identify(make_problem(shown, noise=replace(QUIET, walk_mm=walk_mm)), find_outliers=False)
+        noise = replace(QUIET, walk=GaugeWalk(walk_mm))
+        found = identify(make_problem(shown, noise=noise), find_outliers=False)
         error = found.free - task.free
         covered = error @ np.linalg.solve(found.free_covariance, error) / len(error)
         return float(np.mean(np.sum((task.jacobian @ error) ** 2, axis=1))), float(covered)

@@ -8,6 +8,7 @@ import pytest
 
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
+from hexacell.identification.problem.random_walk import GaugeWalk
 from hexacell.kinematics.pose import Pose
 from hexacell.noise.allowances import Allowances
 from hexacell.robot.model import robot_of
@@ -55,7 +56,7 @@ def test_a_slip_of_any_encoder_is_found(change_of, leg: int, mm: float) -> None:
         {"gauge": 0.2 * np.eye(3)[1]},
         {"slip": of_leg(2, 0.008)},
         {"slip": of_leg(2, 0.05), "stops": 0.02},
-        {"slip": of_leg(2, 0.05), "walk_mm": 0.1},
+        {"slip": of_leg(2, 0.05), "walk": GaugeWalk(0.1)},
         {"slip": of_leg(2, 0.05), "revisits": 4},
     ],
     ids=[

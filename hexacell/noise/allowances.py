@@ -15,7 +15,7 @@ import numpy as np
 
 from hexacell.cell.model import CellSettings
 from hexacell.design.predicted_records import CHANCE_SIGMAS
-from hexacell.distributions import normal_probability, student_limit
+from hexacell.distributions import chi_square_exceedance, normal_probability, student_limit
 from hexacell.errors import LimitError
 from hexacell.identification.solver.result import Identification
 from hexacell.identification.solver.term_estimates import TermEstimates
@@ -28,6 +28,11 @@ from hexacell.robot.stated import gauge_travel_of
 
 SIGMAS = 5.0
 """Standard deviations up to which a difference is chance, at some hundred stops of six joints each."""
+
+UNCHANGED = 1e-4
+"""Probability by noise below which a reference is not as it was: so seldom a point is measured again for
+nothing after an interruption. Gauges that were moved may differ along an axis by no more than chance, where
+encoders hardly tell how the ball moved, and yet by nothing that joints could have done."""
 
 DENIED = 3.0
 """Standard deviations by which gauges must contradict an encoder that shows more than chance."""
@@ -111,11 +116,13 @@ class Allowances:
         is_fixed = self.settings.guards.limits == "fixed"
         explicable = SIGMAS * np.sqrt(np.diag(covariance) + readings * noise.walk.step_mm**2)
         unknown = np.zeros(LEGS) if unknown is None else unknown
+        unexplained, sides = change[:3] - ball.motion(joints), ball.by_joints * unknown
+        whole = covariance + sides @ sides.T + readings * noise.walk.step_mm**2 * np.eye(3)
         explicable = explicable + np.abs(ball.by_joints) @ unknown
         chance = float(np.sqrt(2.0)) * self.stop_sigmas * np.hypot(noise.encoders, self.stops) + unknown
         is_known = self.is_measured or not self.settings.noise.revisits
         return ReferenceChange(
-            unexplained_mm=change[:3] - ball.motion(joints),
+            unexplained_mm=unexplained,
             covariance=covariance,
             by_stops=2.0 * ball.by_joints @ ball.by_joints.T,
             explicable_mm=np.zeros(3) if is_fixed else explicable,
@@ -126,6 +133,7 @@ class Allowances:
             chance_joints=chance if is_known else np.full(LEGS, np.inf),
             at_rest=readings_covariance + ball.covariance(joints - np.diag(joints)),
             walk_mm=noise.walk.step_mm,
+            chance=chi_square_exceedance(3.0, float(unexplained @ np.linalg.solve(whole, unexplained))),
         )
 
     def between_visits(self, reference: Pose, visits: Array) -> "tuple[ReferenceChange, ...]":
@@ -196,6 +204,7 @@ class ReferenceChange:
         chance_joints: (6,) up to which an encoder that did not slip may differ.
         at_rest: (6, 3, 3), mm^2, the ``covariance`` if that leg did not move, whatever its encoder shows.
         walk_mm: of the drift of the gauges from one reading to the next.
+        chance: probability that all this explains as much.
     """
 
     unexplained_mm: Array
@@ -209,6 +218,7 @@ class ReferenceChange:
     chance_joints: Array = field(default_factory=lambda: np.full(LEGS, np.inf))
     at_rest: Array = field(default_factory=lambda: np.zeros((LEGS, 3, 3)))
     walk_mm: float = 0.0
+    chance: float = 1.0
 
     @property
     def by_drift(self) -> Array:
@@ -218,6 +228,10 @@ class ReferenceChange:
     def exceeds(self, limit_mm: float) -> bool:
         """Whether a gauge shows more than a limit, and more than is explicable."""
         return bool((np.abs(self.unexplained_mm) > np.maximum(limit_mm, self.explicable_mm)).any())
+
+    def is_unlikely(self, limit_mm: float) -> bool:
+        """Whether a gauge shows more than a limit, and all three together what chance hardly explains."""
+        return bool((np.abs(self.unexplained_mm) > limit_mm).any()) and self.chance < UNCHANGED
 
     def leg_beyond(self, limit: float) -> int | None:
         """The leg, from 0, whose encoder shows most, beyond a limit and what is explicable; or None."""

@@ -70,7 +70,7 @@ class Revisit(StepOfSet):
         limit_mm, joint_limit = run.settings.reference_agreement
         if (leg := change.slipped_encoder()) is not None:
             shown = slip_in_words(change, leg, run.settings.mechanism.words.joint_unit)
-        elif change.exceeds(limit_mm):
+        elif change.exceeds(limit_mm) or change.is_unlikely(limit_mm):
             shown = f"the gauges show {in_words(change.unexplained_mm)} that the encoders do not explain"
             shown += f", more than {limit_mm:g} mm"
         elif (leg := change.leg_beyond(joint_limit)) is not None:

@@ -72,3 +72,30 @@ def test_a_slip_of_any_encoder_is_found(change_of, leg: int, mm: float) -> None:
 def test_nothing_else_is_taken_for_a_slip(change_of, changed: Any) -> None:
     """The limit is what this machine was measured to repeat by, not a number."""
     assert change_of(**changed).slipped_encoder() is None
+
+
+STATED = {"encoder": 0.01, "gauge_mm": 0.01}
+AGREEMENT_MM = 0.05
+
+
+def test_gauges_that_were_moved_are_seen_where_no_axis_shows_more_than_chance(change_of) -> None:
+    """What joints do along x and z they do along y as well: chance does not do it along these alone."""
+    moved = change_of(gauge=[0.07, -0.03, -0.08], **STATED)
+    assert not moved.exceeds(AGREEMENT_MM)
+    assert moved.is_unlikely(AGREEMENT_MM)
+    assert not change_of(gauge=[0.04, -0.03, -0.04], **STATED).is_unlikely(AGREEMENT_MM), "they agree"
+
+
+def test_noise_does_not_move_gauges(change_of) -> None:
+    random = np.random.default_rng(3)
+
+    def drawn() -> Any:
+        read = {
+            name: np.sqrt(2.0) * 0.01 * random.standard_normal(n) for name, n in (("slip", 6), ("gauge", 3))
+        }
+        return change_of(**read, **STATED)
+
+    changes = [drawn() for _ in range(60)]
+    assert np.mean([np.abs(one.unexplained_mm).max() > AGREEMENT_MM for one in changes]) > 0.3
+    assert not any(one.is_unlikely(AGREEMENT_MM) for one in changes)
+    assert np.mean([one.chance < 0.05 for one in changes]) <= 0.05

@@ -226,12 +226,8 @@ class SimulatedMachine:
         return PoseBatch(position[None], (rotations.from_vector(share * turn) @ line.rotations[row])[None])
 
     def _straight_line(self, start: PoseBatch, end: PoseBatch) -> tuple[PoseBatch, Array]:
-        """Poses (n) on a line and their joints (n, 6), between which joints may go at one rate.
-
-        Where the force of a leg with play changes its sign the joint jumps, which no segment is short
-        enough for: what counts is how the joints bend without the corrections.
-        """
-        steps = LINE_STEPS
+        """Poses (n) on a line and their joints (n, 6), between which joints may go at one rate."""
+        steps = LINE_STEPS  # by how joints bend without corrections: with play they jump in any segment
         while True:
             line = interpolate_line(start, end, 2 * steps)
             joints = self._joints(line)

@@ -30,9 +30,8 @@ SIGMAS = 5.0
 """Standard deviations up to which a difference is chance, at some hundred stops of six joints each."""
 
 UNCHANGED = 1e-4
-"""Probability by noise below which a reference is not as it was: so seldom a point is measured again for
-nothing after an interruption. Gauges that were moved may differ along an axis by no more than chance, where
-encoders hardly tell how the ball moved, and yet by nothing that joints could have done."""
+"""Probability by noise below which gauges were moved meanwhile: along each axis alone they may differ by no
+more than chance, where encoders hardly tell how the ball moved, and yet by nothing that joints could do."""
 
 DENIED = 3.0
 """Standard deviations by which gauges must contradict an encoder that shows more than chance."""
@@ -244,10 +243,9 @@ class ReferenceChange:
         A joint that stopped elsewhere takes the ball along, as far as the geometry is known. Where only the
         encoder changed, the gauges lack exactly the share of that joint: the likelihoods are compared.
         """
-        drift = self.by_drift
 
         def unlikelihood(unexplained: Array, covariance: Array) -> float:
-            whole = covariance + drift
+            whole = covariance + self.by_drift
             return float(unexplained @ np.linalg.solve(whole, unexplained) + np.linalg.slogdet(whole)[1])
 
         beyond: list[int] = np.flatnonzero(np.abs(self.joints) > self.chance_joints).tolist()

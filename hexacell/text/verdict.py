@@ -185,8 +185,7 @@ def improvement_sentence(
         if (alone := verified.alone) is not None:
             size, expanded = alone.with_u("mm"), alone.expanded
             if expanded is not None and alone.value < NO_ERROR_SHARE * expanded:
-                # What goes by the side of arrival leaves the geometry right, and is all in U.
-                size = f"up to {shown(expanded)}"
+                size = f"up to {shown(expanded)}"  # by the side of arrival: the geometry is right
             after = f"{size} with the best geometry alone, {after}"
     return f"Largest position error at the task poses: {now} with {before}, {after}."
 

@@ -219,8 +219,7 @@ class Failed(BaseEvent):
     def applied_to(self, state: RunState) -> RunState:
         """A ball that left its plate on the way to a chosen pose is a rejected record.
 
-        Where the whole set is measured again, nothing is measured near that pose: the robot is not what
-        the estimate holds it for there.
+        Where the whole set is measured again, nothing is measured near that pose: the estimate errs there.
         """
         where = (self.failure, place_of(self.step))
         counted = replace(state, failures={**state.failures, where: self.attempt}).without_position()

@@ -113,10 +113,11 @@ class Allowances:
         readings_covariance = 2.0 * noise.record_covariance(ball.by_joints[None])[0]
         covariance = readings_covariance + ball.covariance(joints)
         is_fixed = self.settings.guards.limits == "fixed"
-        explicable = SIGMAS * np.sqrt(np.diag(covariance) + readings * noise.walk.step_mm**2)
+        by_drift = readings * noise.walk.step_mm**2 * np.eye(3)
+        explicable = SIGMAS * np.sqrt(np.diag(covariance + by_drift))
         unknown = np.zeros(LEGS) if unknown is None else unknown
         unexplained, sides = change[:3] - ball.motion(joints), ball.by_joints * unknown
-        whole = covariance + sides @ sides.T + readings * noise.walk.step_mm**2 * np.eye(3)
+        whole = covariance + by_drift + sides @ sides.T
         explicable = explicable + np.abs(ball.by_joints) @ unknown
         chance = float(np.sqrt(2.0)) * self.stop_sigmas * np.hypot(noise.encoders, self.stops) + unknown
         is_known = self.is_measured or not self.settings.noise.revisits
@@ -131,8 +132,10 @@ class Allowances:
             by_joints=ball.by_joints,
             chance_joints=chance if is_known else np.full(LEGS, np.inf),
             at_rest=readings_covariance + ball.covariance(joints - np.diag(joints)),
-            walk_mm=noise.walk.step_mm,
-            chance=chi_square_exceedance(3.0, float(unexplained @ np.linalg.solve(whole, unexplained))),
+            by_drift=by_drift,
+            probability=chi_square_exceedance(
+                3.0, float(unexplained @ np.linalg.solve(whole, unexplained))
+            ),
         )
 
     def between_visits(self, reference: Pose, visits: Array) -> "tuple[ReferenceChange, ...]":
@@ -202,8 +205,8 @@ class ReferenceChange:
         by_joints: (3, 6) derivative of the ball's position, mm by the joints' unit.
         chance_joints: (6,) up to which an encoder that did not slip may differ.
         at_rest: (6, 3, 3), mm^2, the ``covariance`` if that leg did not move, whatever its encoder shows.
-        walk_mm: of the drift of the gauges from one reading to the next.
-        chance: probability that all this explains as much.
+        by_drift: (3, 3), mm^2, that the known drift of the gauges adds to the ``covariance``.
+        probability: of as much, by all this.
     """
 
     unexplained_mm: Array
@@ -216,13 +219,8 @@ class ReferenceChange:
     by_joints: Array = field(default_factory=lambda: np.zeros((3, LEGS)))
     chance_joints: Array = field(default_factory=lambda: np.full(LEGS, np.inf))
     at_rest: Array = field(default_factory=lambda: np.zeros((LEGS, 3, 3)))
-    walk_mm: float = 0.0
-    chance: float = 1.0
-
-    @property
-    def by_drift(self) -> Array:
-        """The covariance (3, 3), mm^2, by which the known drift of the gauges adds to ``covariance``."""
-        return np.asarray(self.readings * self.walk_mm**2 * np.eye(3))
+    by_drift: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    probability: float = 1.0
 
     def exceeds(self, limit_mm: float) -> bool:
         """Whether a gauge shows more than a limit, and more than is explicable."""
@@ -230,7 +228,7 @@ class ReferenceChange:
 
     def is_unlikely(self, limit_mm: float) -> bool:
         """Whether a gauge shows more than a limit, and all three together what chance hardly explains."""
-        return bool((np.abs(self.unexplained_mm) > limit_mm).any()) and self.chance < UNCHANGED
+        return bool((np.abs(self.unexplained_mm) > limit_mm).any()) and self.probability < UNCHANGED
 
     def leg_beyond(self, limit: float) -> int | None:
         """The leg, from 0, whose encoder shows most, beyond a limit and what is explicable; or None."""

@@ -114,7 +114,10 @@ def setting(number: int, candidates: int = 64, terms: tuple[str, ...] = ()) -> S
 
 
 def _best_sides(belief: RobotBelief, commands: PoseBatch) -> Array:
-    """The sides (n, 6) from which joints arrive over waypoints, as a run chooses them; 0 for none."""
+    """The sides (n, 6) from which joints arrive over waypoints, as a run chooses them; 0 for none.
+
+    Unlike there it is not asked whether the waypoints are clear.
+    """
     targets, _ = outcomes_of(belief, commands)
     sides = np.zeros_like(targets.joints)
     if belief.terms is None or not any(term.needs_directions for term in belief.terms.terms):

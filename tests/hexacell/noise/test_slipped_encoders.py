@@ -98,4 +98,4 @@ def test_noise_does_not_move_gauges(change_of) -> None:
     changes = [drawn() for _ in range(60)]
     assert np.mean([np.abs(one.unexplained_mm).max() > AGREEMENT_MM for one in changes]) > 0.3
     assert not any(one.is_unlikely(AGREEMENT_MM) for one in changes)
-    assert np.mean([one.chance < 0.05 for one in changes]) <= 0.05
+    assert np.mean([one.probability < 0.05 for one in changes]) <= 0.05

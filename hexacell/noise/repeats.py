@@ -31,15 +31,13 @@ from hexacell.uncertainty.effect_kinds import with_measured_stops
 SIGNIFICANCE = 0.003
 """Probability of the noise that is counted with below which the repeats show that it is larger.
 
-With ``LIKELY`` it is the share of healthy machines of which that is said falsely; scatter as large as the
-noise has one of less than a millionth."""
+Of the repeats and the residuals of the fit together it is that below which stops that no encoder sees count
+at work: residuals are many, so that few machines have such and are not noticed. Twice it is the share of
+healthy machines of which either is said falsely (:mod:`~hexacell.verdict.scatter_evidence`); scatter as
+large as the noise has a probability of less than a millionth."""
 
 LEAST_FREEDOM = 9
 """Fewer degrees of freedom say nothing of use."""
-
-LIKELY = 0.003
-"""Probability likewise, of the repeats and of the residuals of the fit together, below which stops that no
-encoder sees count at work. The residuals are many, so that few machines have them and are not noticed."""
 
 DRIFTS = 0.01
 """Probability of the changes at the ends of sets, by noise alone, below which they may be of a drift."""
@@ -76,12 +74,14 @@ class Repeats:
         is_measured: whether that noise was measured by some of them, not stated.
         seen_freedom: degrees of freedom of the stops that the encoders show.
         residuals: of a fit with that noise; None without one.
+        significance: the probability below which they show more than the noise.
     """
 
     changes: tuple[ReferenceChange, ...]
     is_measured: bool = False
     seen_freedom: float = np.inf
     residuals: ChiSquareTest | None = None
+    significance: float = SIGNIFICANCE
 
     @classmethod
     def of(
@@ -90,13 +90,15 @@ class Repeats:
         changes: Sequence[ReferenceChange],
         noise: Noise,
         found: Identification | None = None,
+        *,
+        significance: float = SIGNIFICANCE,
     ) -> "Repeats":
         """By visits of one reference, changes of readings at others, and what was found with that noise."""
         seen = np.inf if approaches is None else float(LEGS * (approaches.visits - 1))
         is_measured = approaches is not None and approaches.source is not None
         is_of_fit = found is not None and found.problem.noise.encoder <= noise.encoder * (1.0 + 1e-6)
         goodness = found.goodness if found and is_of_fit else None
-        return cls(tuple(changes), is_measured, seen, goodness)
+        return cls(tuple(changes), is_measured, seen, goodness, significance)
 
     @property
     def freedom(self) -> float:
@@ -110,7 +112,7 @@ class Repeats:
 
     def applied_to(self, noise: Noise) -> Noise:
         """The noise as the repeats show it; what is stated stays unless they contradict it."""
-        if not self._is_larger(SIGNIFICANCE):
+        if not self._is_larger():
             return replace(noise, freedom=self.freedom) if self.is_measured else noise
         stops = self.unseen_stops(noise)
         if stops.better > 0.0:
@@ -123,8 +125,7 @@ class Repeats:
 
         It counts at work even where noise of all readings explains the changes better: that is the worst.
         """
-        is_likely = self.residuals is not None and self._is_larger(LIKELY, self.residuals)
-        if not (is_likely or self._is_larger(SIGNIFICANCE)):
+        if not (self._is_larger() or (self.residuals is not None and self._is_larger(self.residuals))):
             return MoreScatter(0.0, self.freedom, 0.0)
         return self._likeliest(noise.encoder * SIZES, np.stack([one.by_stops for one in self.changes]))
 
@@ -178,11 +179,11 @@ class Repeats:
         effects = with_measured_stops(robot.effects, 1e3 * unseen.size, unseen.freedom, self.seen_freedom)
         return replace(robot, noise=self.applied_to(robot.noise), effects=effects)
 
-    def _is_larger(self, significance: float, residuals: ChiSquareTest = NO_RESIDUALS) -> bool:
+    def _is_larger(self, residuals: ChiSquareTest = NO_RESIDUALS) -> bool:
         if self.freedom < LEAST_FREEDOM:
             return False
         freedom, chi2 = self.freedom + residuals.expected, self.chi2 + residuals.chi2
-        return chi_square_exceedance(freedom, chi2) < significance
+        return chi_square_exceedance(freedom, chi2) < self.significance
 
     @property
     def _factor(self) -> float:

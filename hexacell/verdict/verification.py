@@ -162,7 +162,7 @@ def verify(settings: CellSettings, robot: Robot, found: Identification, held_out
     budget = task.budget(updated, belief, robot.effects, robot.known_effects)
     accuracy = None
     if budget is not None:
-        about = settings, robot, found, updated, task, budget, held_out.length
+        about = settings, robot, updated, task, budget, held_out.length
         accuracy = _verified_accuracy(*about, is_evident=all(test.passed for test in tests))
     if accuracy is not None and (length := accuracy.length) is not None:
         sentence = "The records of the length check agree with each other."
@@ -201,7 +201,6 @@ def _errs_less(budget: UncertaintyBudget | None, robot: Robot, updated: Identifi
 def _verified_accuracy(
     settings: CellSettings,
     robot: Robot,
-    found: Identification,
     updated: Identification,
     task: Task,
     budget: UncertaintyBudget,
@@ -209,7 +208,7 @@ def _verified_accuracy(
     *,
     is_evident: bool,
 ) -> VerifiedAccuracy:
-    """The error that the geometry of ``found`` makes at the task poses, by the updated estimate."""
+    """The error that the geometry of ``robot`` makes at the task poses, by the updated estimate."""
     belief, length = robot.belief(updated), None
     if measured is not None:
         covariance = updated.free_covariance * updated.goodness.noise_factor**2
@@ -219,10 +218,7 @@ def _verified_accuracy(
         if length.replaces_stated:
             effects = robot.effects, robot.known_effects
             budget = task.budget(updated, belief, *effects, check.observation) or budget
-    # With zeros alone, or what is not geometry beside, what is written is not the estimate.
-    is_estimate = robot.identifies is ParameterChoice.ALL and found.terms is None
-    written = found.free if is_estimate else robot.free_parameters
-    difference = written - updated.free
+    difference = robot.free_parameters - updated.free
     return VerifiedAccuracy.of(
         budget.errors_of(difference),
         settings,

@@ -35,7 +35,7 @@ from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
 from hexacell.noise.allowances import Allowances
 from hexacell.noise.measured_noise import MeasuredNoise, with_measured_noise
-from hexacell.noise.repeats import Repeats
+from hexacell.noise.repeats import SIGNIFICANCE, Repeats
 from hexacell.results.result import AcceptedResult
 from hexacell.results.term_result import known_terms
 from hexacell.robot.model import Robot
@@ -143,6 +143,7 @@ class Knowledge:
         written: parameters of the proposed geometry, in the controller's frames, with the ``corrections``
             that are proposed beside it; ``is_committed``: the controller has it.
         walk: how the gauges drift.
+        significance: the probability below which repeats show more noise than was measured.
     """
 
     calibration: Calibration
@@ -154,6 +155,7 @@ class Knowledge:
     corrections: Corrections | None = None
     is_committed: bool = False
     walk: GaugeWalk = NO_WALK
+    significance: float = SIGNIFICANCE
 
     @cached_property
     def settings(self) -> CellSettings:
@@ -273,7 +275,8 @@ class Knowledge:
         identifying = replace(self.identifying.robot, noise=robot.noise)
         allowances = Allowances(self.calibration.settings, identifying, is_measured=True, found=found)
         changes = repeated_readings(state, self.calibration.plan, allowances)
-        return Repeats.of(noise.approaches, [*changes], robot.noise, found).applied_to_robot(robot)
+        about = noise.approaches, [*changes], robot.noise, found
+        return Repeats.of(*about, significance=self.significance).applied_to_robot(robot)
 
     def _drifting(self, robot: Robot) -> Robot:
         return replace(robot, noise=replace(robot.noise, walk=self.walk))

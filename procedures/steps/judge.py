@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from functools import partial
 from statistics import fmean
 from typing import ClassVar, Literal
 
@@ -12,14 +13,10 @@ from hexacell.measurements.csv_file import write_measurements
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.length_check import LengthMeasurements, LengthStatement, length_statement
-from hexacell.verdict.verification import (
-    HeldOut,
-    Verification,
-    length_line,
-    outcome_line,
-    reason_of,
-    verify,
-)
+from hexacell.verdict.model_evidence import BEYOND_CHANCE
+from hexacell.verdict.scatter_evidence import JudgedResult, verify_with_scatter
+from hexacell.verdict.verification import HeldOut, Verification, length_line, outcome_line, reason_of
+from procedures.calibration.calibration import Knowledge
 from procedures.calibration.held_out_poses import confirming_poses
 from procedures.resources.run_resources import RunResources
 from procedures.run.keys import Phase, SixNumbers
@@ -80,16 +77,24 @@ class Judge(Computation):
             case "length":
                 return _length_checked(run, state)
         known = run.calibration.known(state)
-        found = identify(known.robot_of(state).problem(state.measurements()))
-        written = known.written_robot(state)
-        verification = verify(known.settings, written, found, _held_out(known.settings, state))
+        result = _judged_result(known, state)
+        beyond_chance = partial(_judged_result, replace(known, significance=BEYOND_CHANCE), state)
+        held_out = _held_out(known.settings, state)
+        verification = verify_with_scatter(known.settings, result, beyond_chance, held_out)
         if verification.needs_confirmation and state.confirmation is None:
-            poses = confirming_poses(known, found, state)
+            poses = confirming_poses(known, result.found, state)
             if any(poses):
                 return ConfirmationPlanned(reason=reason_of(verification), poses=poses)
         assert state.identified is not None  # noqa: S101 - decided only after the identification
-        line = outcome_line(state.identified.result, len(found.free), verification, written.unknowns)
+        parameters, unknowns = len(result.found.free), result.robot.unknowns
+        line = outcome_line(state.identified.result, parameters, verification, unknowns)
         return ResultValidated(verdict=verification.verdict, line=line, verification=verification)
+
+
+def _judged_result(known: Knowledge, state: RunState) -> JudgedResult:
+    """What is verified, with the noise as the repeats show it at the significance of what is ``known``."""
+    found = identify(known.robot_of(state).problem(state.measurements()))
+    return JudgedResult(known.written_robot(state), found)
 
 
 def _checked(run: RunResources, state: RunState) -> ResultValidated:

@@ -21,12 +21,14 @@ from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.noise.allowances import Allowances
 from hexacell.noise.measured_noise import MeasuredNoise, with_measured_noise
 from hexacell.noise.noise_assessment import NoiseReadings, assess_again, assess_noise
-from hexacell.noise.repeats import Repeats
+from hexacell.noise.repeats import SIGNIFICANCE, Repeats
 from hexacell.results.written_geometry import as_written
 from hexacell.robot.model import Robot, make_robot
 from hexacell.robot.virtual_robot import VirtualRobot, random_robot
 from hexacell.verdict.decision import Verdict
-from hexacell.verdict.verification import HeldOut, Verification, verify
+from hexacell.verdict.model_evidence import BEYOND_CHANCE
+from hexacell.verdict.scatter_evidence import JudgedResult, verify_with_scatter
+from hexacell.verdict.verification import HeldOut, Verification
 from procedures.calibration.held_out_poses import HeldOutPoses
 from procedures.run.keys import SixNumbers
 from tests.benchmarks.worlds.effects import Effect
@@ -197,9 +199,15 @@ def calibrate(
     found = identify(noise.robot(campaign.plan.robot, first).problem(measurements))
     written = as_written(settings, robot, found.geometry).geometry
     after = make_robot(settings, ControllerGeometry(written, robot.branch), taught=written)
-    after = noise.robot(after, first)
-    verification = verification_of(settings, found, (robot, after), (truth, random), scatter)
-    return VirtualCalibration(found, after, verification, campaign.outside)
+
+    def beyond_chance() -> JudgedResult:
+        certain = replace(noise, significance=BEYOND_CHANCE)
+        found = identify(certain.robot(campaign.plan.robot, first).problem(measurements))
+        return JudgedResult(certain.robot(after, first), found)
+
+    result = JudgedResult(noise.robot(after, first), found)
+    verification = verification_of(settings, result, beyond_chance, robot, (truth, random), scatter)
+    return VirtualCalibration(found, result.robot, verification, campaign.outside)
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,6 +218,7 @@ class MeasuredRun:
     readings: NoiseReadings
     noise: MeasuredNoise
     closings: Sequence[tuple[Pose, Array, Array]] = ()
+    significance: float = SIGNIFICANCE
 
     def settings(self) -> CellSettings:
         """Of the cell, with that noise."""
@@ -223,7 +232,8 @@ class MeasuredRun:
         allowances = Allowances(self.plan.settings, measuring, is_measured=True, found=found)
         visits = allowances.between_visits(self.readings.reference, self.readings.visits)
         changes = [*visits, *(allowances.since(*one) for one in self.closings)]
-        return Repeats.of(noise.approaches, changes, robot.noise, found).applied_to_robot(robot)
+        about = noise.approaches, changes, robot.noise, found
+        return Repeats.of(*about, significance=self.significance).applied_to_robot(robot)
 
 
 def _visits(settings: CellSettings, virtual: VirtualRobot) -> NoiseReadings:
@@ -257,21 +267,23 @@ class _ClosedCampaign(VirtualCampaign):
 
 def verification_of(
     settings: CellSettings,
-    found: Identification,
-    robots: tuple[Robot, Robot],
+    result: JudgedResult,
+    beyond_chance: Callable[[], JudgedResult],
+    before: Robot,
     actual: tuple[Geometry, np.random.Generator],
     scatter: Scatter = REPEATS,
 ) -> Verification:
     """What a run states of a result: held-out poses before and after, and new ones after a narrow failure.
 
     Args:
-        robots: with the controller's previous geometry, and with the result in it.
+        beyond_chance: the result with that scatter alone which is beyond chance.
+        before: the robot with the controller's previous geometry.
         actual: the robot's geometry, and the source of all noise.
 
     Raises:
         HexacellError: a run would end with this message.
     """
-    before, after = robots
+    after, found = result
     common = HeldOutPoses(settings, before, CANDIDATES).before(found)
     chosen = HeldOutPoses(settings, after, CANDIDATES)
     wide = chosen.after(found, common)
@@ -289,15 +301,15 @@ def verification_of(
         _deviations(compared),
         left_travel=not _keeps_travel(after, new),
     )
-    verified = verify(settings, after, found, held_out)
+    verified = verify_with_scatter(settings, result, beyond_chance, held_out)
     if not verified.needs_confirmation:
         return verified
     poses = chosen.confirming(found, common, wide)
     records = _visited(scatter.virtual(after, *actual), poses, CONFIRMING_FROM)
     confirming = MeasurementSet(tuple(_inside(after, records, records)[0]))
-    return (
-        verify(settings, after, found, replace(held_out, confirming=confirming)) if confirming else verified
-    )
+    if not confirming:
+        return verified
+    return verify_with_scatter(settings, result, beyond_chance, replace(held_out, confirming=confirming))
 
 
 def _visited(virtual: VirtualRobot, points: Sequence[Sequence[SixNumbers]], first: int) -> list[Record]:

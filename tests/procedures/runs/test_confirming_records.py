@@ -6,6 +6,7 @@ import pytest
 
 from hexacell.errors import ExitCode
 from hexacell.kinematics.pose import Pose
+from hexacell.noise import repeats
 from hexacell.verdict import model_evidence
 from hexacell.verdict.decision import Verdict
 from procedures.calibration.held_out_poses import HeldOutPoses
@@ -69,6 +70,18 @@ async def test_a_failure_that_is_not_explained_leaves_the_result_not_evaluated(
     assert happened(rig, events.ResultValidated)[0].verdict is Verdict.NOT_EVALUATED
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
     assert rig.config == recording.config_before
+
+
+@pytest.mark.slow
+async def test_a_run_asks_the_held_out_records_about_scatter_that_chance_may_show(make_rig, monkeypatch):
+    monkeypatch.setattr(model_evidence, "CONFIRMING_PROBABILITY", 1.1)
+    monkeypatch.setattr(repeats, "chi_square_exceedance", lambda *_: 1e-4)
+    rig = make_rig(noise__standstill_readings=16, noise__revisits=6)
+    rig.operator.name = None
+    await rig.run()
+    (judged,) = happened(rig, events.ResultValidated)
+    assert judged.verification is not None
+    assert judged.verification.tests[-1].name == "scatter"
 
 
 async def test_a_run_killed_among_confirming_records_goes_on_there(recording, replayed) -> None:

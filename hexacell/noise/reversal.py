@@ -11,7 +11,6 @@ gauge is that and four standard deviations of its visits from one side; of these
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -49,26 +48,13 @@ class Reversal(Frozen):
     ball_sigma_mm: float = 0.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Revisit:
-    """Two visits of a pose.
-
-    Attributes:
-        change: how what gauges and encoders show differs.
-        by_joints: (3, 6) motion of the ball by the joints there.
-        turned: (6,) how the directions of arrival differ.
-    """
-
-    change: ReferenceChange
-    by_joints: Array
-    turned: Array
-
-
-def reversal_of(visits: Sequence[Revisit], known: Array, sigma: Array, unit: JointUnit) -> Reversal | None:
+def reversal_of(
+    visits: Sequence[tuple[ReferenceChange, Array]], known: Array, sigma: Array, unit: JointUnit
+) -> Reversal | None:
     """Reversal and repeatability; those of the ball are at the pose of the first visits.
 
     Args:
-        visits: pairs of them.
+        visits: pairs of them: how what is shown differs, and the directions of arrival (6,).
         known: what is known beforehand of the reversal value of each joint (6,).
         sigma: one standard deviation of that (6,).
         unit: of the joint variables.
@@ -78,11 +64,12 @@ def reversal_of(visits: Sequence[Revisit], known: Array, sigma: Array, unit: Joi
     """
     if len(visits) < FEWEST_CHANGES:
         return None
-    columns = np.stack([-0.5 * one.by_joints * one.turned for one in visits])
-    beside_encoders = np.stack([one.change.unexplained_mm for one in visits])
-    seen_by_encoders = np.stack([one.by_joints @ one.change.joints for one in visits])
+    changes, by_joints = [change for change, _ in visits], visits[0][0].by_joints
+    columns = np.stack([-0.5 * change.by_joints * turned for change, turned in visits])
+    beside_encoders = np.stack([one.unexplained_mm for one in changes])
+    seen_by_encoders = np.stack([one.by_joints @ one.joints for one in changes])
     unexplained = beside_encoders - columns @ known
-    weights = np.linalg.inv([one.change.covariance for one in visits])
+    weights = np.linalg.inv([one.covariance for one in changes])
     information = np.einsum("nij,nik,nkl->jl", columns, weights, columns)
     seen = np.einsum("nij,nik,nk->j", columns, weights, unexplained)
     factor, prior = 1.0, np.diag(sigma**-2.0)
@@ -92,7 +79,7 @@ def reversal_of(visits: Sequence[Revisit], known: Array, sigma: Array, unit: Joi
         left = unexplained - columns @ more
         freedom = left.size - float(np.trace(covariance @ information) / factor)
         factor = max(1.0, float(np.einsum("ni,nij,nj->", left, weights, left) / freedom))
-    joints, by_joints = known + more, visits[0].by_joints
+    joints = known + more
     shown = beside_encoders + seen_by_encoders
     # Of one of two visits. A reversal that is not there, but noise of encoders, would make it larger.
     from_one_side = np.minimum((shown**2).sum(axis=0), ((shown - columns @ joints) ** 2).sum(axis=0))

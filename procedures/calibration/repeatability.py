@@ -21,7 +21,7 @@ from hexacell.noise.allowances import Allowances, ReferenceChange, contrasts
 from hexacell.noise.measured_noise import MeasuredNoise
 from hexacell.noise.noise_assessment import NoiseReadings, assess_again
 from hexacell.noise.repeats import Repeats
-from hexacell.noise.reversal import Reversal, Revisit, reversal_of
+from hexacell.noise.reversal import Reversal, reversal_of
 from hexacell.noise.standstill import display_step
 from hexacell.noise.worsening import Worsening, worsening_of
 from procedures.run.keys import Phase
@@ -187,7 +187,7 @@ def reversal_by_repeats(plan: Plan, state: RunState, found: Identification) -> R
     Those count at which it is known from which side every joint had arrived.
     """
     allowances = Allowances(plan.settings, plan.robot, is_measured=True, found=found)
-    visits: list[Revisit] = []
+    visits: list[tuple[ReferenceChange, Array]] = []
     for key, one in state.sets.items():
         if key.phase is not Phase.IDENTIFY or not one.samples:
             continue
@@ -197,10 +197,8 @@ def reversal_by_repeats(plan: Plan, state: RunState, found: Identification) -> R
         rows = np.array([[*one.gauges_mm, *one.joints, *one.directions] for one in known])
         reference = Pose(*one.samples[0].pose)
         before = np.array([0.0, 0.0, 0.0, *one.samples[0].reading.joints])
-        ball = allowances.ball_at(reference, before[3:])
         for row in contrasts(rows):
-            change = allowances.since(reference, before, before + row[:9])
-            visits.append(Revisit(change, ball.by_joints, row[9:]))
+            visits.append((allowances.since(reference, before, before + row[:9]), row[9:]))
     stated, unit = plan.settings.model.backlash, plan.settings.mechanism.words.joint_unit
     if found.terms is not None and BACKLASH in {term.name for term in found.terms.terms}:
         return reversal_of(visits, *found.terms.of(BACKLASH), unit)

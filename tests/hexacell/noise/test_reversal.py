@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hexacell.kinematics.parameters import JointUnit
-from hexacell.noise.reversal import SIGMAS, Reversal, Revisit, reversal_of
+from hexacell.noise.reversal import SIGMAS, Reversal, reversal_of
 from hexacell.text.measured_noise import reversal_sentence
 
 BACKLASH = np.array([0.1, 0.06, 0.09, 0.05, 0.08, 0.07])
@@ -22,9 +22,12 @@ def found(count: int, sides: tuple[int, ...], backlash: Any = BACKLASH, seed: in
         turned = np.subtract(*random.choice(sides, (2, 6))).astype(float)
         shown = -0.5 * by_joints @ (backlash * turned) + np.sqrt(2.0) * NOISE_MM * random.normal(size=3)
         change: Any = SimpleNamespace(
-            unexplained_mm=shown, joints=np.zeros(6), covariance=2.0 * NOISE_MM**2 * np.eye(3)
+            unexplained_mm=shown,
+            joints=np.zeros(6),
+            covariance=2.0 * NOISE_MM**2 * np.eye(3),
+            by_joints=by_joints,
         )
-        visits.append(Revisit(change, by_joints, turned))
+        visits.append((change, turned))
     return reversal_of(visits, np.zeros(6), np.full(6, 0.1), JointUnit.MM)
 
 

@@ -84,12 +84,7 @@ class ConfigFormat(Protocol):
     A plug-in's class takes the parameters of the mechanism, ``[controller.config_options]`` of the cell
     file, a mapping that it checks by itself, and ``is_part``: whether the file is one of several, which has
     some of the parameters, whichever they are, and whose options need not say where the others are.
-
-    Attributes:
-        holds: the kinds of corrections that such a file can have.
     """
-
-    holds: frozenset[CorrectionKind]
 
     def read(self, text: str, source: Path | None) -> ConfigPart:
         """What a text has; ``source`` is what errors name.

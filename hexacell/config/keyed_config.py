@@ -21,7 +21,7 @@ from pydantic import Field, ValidationError
 from hexacell.cell.fields import Positive, Section, Text, first_mistake
 from hexacell.config import interface
 from hexacell.errors import UsageError
-from hexacell.kinematics.corrections import CorrectionKind, Corrections
+from hexacell.kinematics.corrections import Corrections
 from hexacell.kinematics.mechanism import Branch
 from hexacell.kinematics.parameters import LEGS, GeometricParameter, ParameterSet, ParameterUnit
 
@@ -119,8 +119,6 @@ class KeyedConfig:
     Raises:
         UsageError: an option names no parameter, two have the same key, or a branch is missing.
     """
-
-    holds: frozenset[CorrectionKind] = frozenset()
 
     def __init__(
         self,

@@ -65,14 +65,6 @@ class ConfigLayout:
         )
         return cls(parameters, formats, settings.mechanism.words.joint_unit)
 
-    @property
-    def holds(self) -> frozenset[CorrectionKind]:
-        """The kinds of corrections that files of these formats can have.
-
-        Whether the files at hand have a place for them, :attr:`.ControllerGeometry.holds` says.
-        """
-        return frozenset().union(*(one.reader.holds for one in self.formats))
-
     def read(self, *paths: Path) -> interface.ControllerGeometry:
         """The geometry in the files, and the corrections.
 

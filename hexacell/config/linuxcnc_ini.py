@@ -48,8 +48,6 @@ class LinuxcncIniOptions(KeyedOptions):
 class LinuxcncIni(LegCorrections):
     """A :class:`~hexacell.config.interface.ConfigFormat`; raises ``UsageError`` for options."""
 
-    holds = frozenset(CorrectionKind)
-
     def __init__(
         self, parameters: ParameterSet, given: Mapping[str, Any], *, is_part: bool = False
     ) -> None:

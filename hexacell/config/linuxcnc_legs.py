@@ -52,8 +52,6 @@ def _numbers(unit_mm: float) -> Iterator[tuple[str, _Number]]:
 class LegCorrections(KeyedConfig):
     """A config of LinuxCNC that may have these beside a geometry, or beside a part of it."""
 
-    holds = frozenset({CorrectionKind.PLAY, CorrectionKind.COMPLIANCE})
-
     def read(self, text: str, source: Path | None) -> interface.ConfigPart:
         """As any keyed config, with play and compliance if the text has a place for them.
 
@@ -75,7 +73,8 @@ class LegCorrections(KeyedConfig):
             weight_direction=cast("Three", tuple(one / length for one in direction)),
             weight_centre_mm=None if in_middle else cast("Three", tuple(centre)),
         )
-        return replace(part, corrections=found, holds=LegCorrections.holds)
+        holds = frozenset({CorrectionKind.PLAY, CorrectionKind.COMPLIANCE})
+        return replace(part, corrections=found, holds=holds)
 
     def rewrite(
         self, text: str, values: Mapping[str, float], corrections: Corrections | None = None

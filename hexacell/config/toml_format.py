@@ -42,8 +42,6 @@ class NativeToml:
         UsageError: options are given; it has none.
     """
 
-    holds = frozenset(CorrectionKind)
-
     def __init__(
         self, parameters: ParameterSet, given: Mapping[str, Any], *, is_part: bool = False
     ) -> None:
@@ -68,7 +66,7 @@ class NativeToml:
             branch,
             ControllerLimits(joints=axes or None),
             Corrections(**found["corrections"]),
-            self.holds,
+            frozenset(CorrectionKind),
         )
 
     def rewrite(

@@ -57,7 +57,7 @@ def _points_line(assessed: Assessment) -> str:
     """Whether the records of each point agree with what the others predict."""
     if not assessed.points:
         return "Each point by the others: not evaluated, they do not determine the geometry."
-    wrong = [str(one.point) for one in contradicted_points(assessed.points)]
+    wrong = [str(point) for point in contradicted_points(assessed.points)]
     agreeing = f"{len(assessed.points) - len(wrong)} of {len(assessed.points)} agree"
     left = f", not point {', '.join(wrong)}" if wrong else ""
     return f"Each point by the others: {agreeing}{left}."

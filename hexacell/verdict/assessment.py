@@ -1,6 +1,7 @@
 """The assessment of an identification: can it be trusted, and how accurate is the robot with it?"""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from itertools import chain, repeat
 
 import numpy as np
@@ -8,15 +9,11 @@ import numpy as np
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.design.decorrelation import DecorrelatingPose, decorrelating_poses
-from hexacell.identification.diagnostics.model_tests import (
-    PointPrediction,
-    contradicted_points,
-    leave_one_point_out,
-)
+from hexacell.identification.diagnostics.model_tests import contradicted_points, leave_one_point_out
 from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicted_accuracy
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
 from hexacell.identification.identified_zeros import IdentifiedZeros
-from hexacell.identification.solver.chi_square import CONTRADICTED_RATIO, ChiSquareVerdict
+from hexacell.identification.solver.chi_square import CONTRADICTED_RATIO, ChiSquareTest, ChiSquareVerdict
 from hexacell.identification.solver.result import CorrelatedPair, Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
@@ -71,7 +68,7 @@ class Assessment:
     tolerance_violations: tuple[ToleranceViolation, ...] = ()
     possible_causes: tuple[PossibleCause, ...] = ()
     measured_noise: MeasuredNoise | None = None
-    points: tuple[PointPrediction, ...] = ()
+    points: Mapping[int, ChiSquareTest] = field(default_factory=dict)
     zeros: IdentifiedZeros | None = None
     unknown_mm: float = 0.0
     limit_mm: float = np.inf
@@ -173,7 +170,7 @@ def assess(
         tolerance_violations=robot.tolerance_violations(found.estimate),
         possible_causes=possible_causes(found) if found.termination.converged and is_doubtful else (),
         measured_noise=measured_noise,
-        points=leave_one_point_out(found) if found.termination.converged else (),
+        points=leave_one_point_out(found) if found.termination.converged else {},
         zeros=zeros,
         unknown_mm=0.0 if error is None else error.worst(belief.covariance),
         limit_mm=settings.acceptance.position_mm,

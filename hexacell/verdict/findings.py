@@ -114,9 +114,9 @@ def _point_verdict(assessed: Assessment) -> str:
     contradicted = contradicted_points(assessed.points)
     if not contradicted or assessed.found.goodness.agreement is ChiSquareVerdict.TOO_LARGE:
         return ""
-    worst = max(contradicted, key=lambda one: one.test.ratio)
+    worst = max(contradicted, key=lambda point: contradicted[point].ratio)
     return (
-        f"Doubtful: the records of point {worst.point} are {worst.test.ratio:.1f} times as far as the "
+        f"Doubtful: the records of point {worst} are {contradicted[worst].ratio:.1f} times as far as the "
         "stated noise explains from what the other points predict, so the model does not hold."
     )
 

@@ -30,12 +30,12 @@ def fit_document(assessed: Assessment) -> dict[str, Any]:
         },
         "points_predicted": [
             {
-                "point": one.point,
-                "probability": one.test.probability,
-                "noise_ratio": one.test.ratio,
-                "agrees": one not in contradicted,
+                "point": point,
+                "probability": test.probability,
+                "noise_ratio": test.ratio,
+                "agrees": point not in contradicted,
             }
-            for one in assessed.points
+            for point, test in assessed.points.items()
         ],
         "noise": _noise(assessed.noise),
         "measured_noise": assessed.measured_noise and assessed.measured_noise.model_dump(mode="json"),

@@ -59,12 +59,12 @@ def model_tests(found: Identification, updated: Identification) -> tuple[ModelTe
         _model_test(HELD_OUT, predicted, "The held-out records", passed=is_predicted),
         *(
             _model_test(
-                f"point {one.point} from the others",
-                one.test,
-                f"The records of point {one.point}, predicted from the other points,",
-                passed=one.test.probability >= SMALLEST_PROBABILITY / len(points),
+                f"point {point} from the others",
+                test,
+                f"The records of point {point}, predicted from the other points,",
+                passed=test.probability >= SMALLEST_PROBABILITY / len(points),
             )
-            for one in points
+            for point, test in points.items()
         ),
     )
 

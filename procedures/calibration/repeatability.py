@@ -197,8 +197,9 @@ def reversal_by_repeats(plan: Plan, state: RunState, found: Identification) -> R
         rows = np.array([[*one.gauges_mm, *one.joints, *one.directions] for one in known])
         reference = Pose(*one.samples[0].pose)
         before = np.array([0.0, 0.0, 0.0, *one.samples[0].reading.joints])
-        for row in contrasts(rows):
-            visits.append((allowances.since(reference, before, before + row[:9]), row[9:]))
+        visits += [
+            (allowances.since(reference, before, before + row[:9]), row[9:]) for row in contrasts(rows)
+        ]
     stated, unit = plan.settings.model.backlash, plan.settings.mechanism.words.joint_unit
     if found.terms is not None and BACKLASH in {term.name for term in found.terms.terms}:
         return reversal_of(visits, *found.terms.of(BACKLASH), unit)

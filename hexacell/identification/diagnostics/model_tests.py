@@ -7,8 +7,8 @@ costs are linearized at the solution of all records (:class:`.LinearCosts`).
 Sources: Gelb (ed.), Applied Optimal Estimation, 1974 (innovations); Cook and Weisberg 1982 (deletion).
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,14 +19,6 @@ from hexacell.identification.solver.fit import FINE, solve_around_singularities
 from hexacell.identification.solver.linear_model import LinearCosts
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.rotations import Mask
-
-
-@dataclass(frozen=True, slots=True)
-class PointPrediction:
-    """How well a point's records were predicted from those of all other points."""
-
-    point: int
-    test: ChiSquareTest
 
 
 def update(found: Identification, further: Problem) -> Identification:
@@ -60,20 +52,21 @@ def prediction_test(found: Identification, rows: Mask) -> ChiSquareTest:
     return _prediction_test(LinearCosts.at(found.problem, found.prediction), rows)
 
 
-def leave_one_point_out(found: Identification) -> tuple[PointPrediction, ...]:
-    """Each point's records predicted by the others, where those determine the geometry."""
+def leave_one_point_out(found: Identification) -> dict[int, ChiSquareTest]:
+    """How well each point's records are predicted by the others, where those determine the geometry."""
     costs = LinearCosts.at(found.problem, found.prediction)
     points = found.problem.labels[:, 0]
-    return tuple(
-        PointPrediction(point, _prediction_test(costs, rows))
+    return {
+        point: _prediction_test(costs, rows)
         for point, rows in ((int(point), points == point) for point in np.unique(points))
         if found.problem.subset(~rows).is_determined
-    )
+    }
 
 
-def contradicted_points(points: Sequence[PointPrediction]) -> tuple[PointPrediction, ...]:
+def contradicted_points(points: Mapping[int, ChiSquareTest]) -> dict[int, ChiSquareTest]:
     """The points whose records the others contradict; by chance any of them in 0.1 % of all cases."""
-    return tuple(one for one in points if one.test.probability < SMALLEST_PROBABILITY / len(points))
+    least = SMALLEST_PROBABILITY / max(1, len(points))
+    return {point: test for point, test in points.items() if test.probability < least}
 
 
 def _prediction_test(costs: LinearCosts, rows: Mask) -> ChiSquareTest:

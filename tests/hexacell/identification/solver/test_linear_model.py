@@ -81,7 +81,7 @@ def test_a_point_is_predicted_under_the_full_covariance(found):
     tested = prediction_test(found, rows)
     assert tested.chi2 == pytest.approx(dense, rel=1e-5)
     assert tested.expected == 30
-    assert leave_one_point_out(found)[2].test == tested
+    assert leave_one_point_out(found)[3] == tested
 
 
 def test_evidence_is_the_density_of_all_that_the_points_zeros_leave(found):

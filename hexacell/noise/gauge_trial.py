@@ -49,14 +49,6 @@ class GaugeMistake(StrEnum):
     EXCHANGED = "exchanged"
 
 
-@dataclass(frozen=True, slots=True)
-class TrialFinding:
-    """A mistake, and the gauges that it concerns, by the numbers of their base axes."""
-
-    mistake: GaugeMistake
-    gauges: tuple[int, ...]
-
-
 @dataclass(frozen=True, eq=False)
 class GaugeTrial:
     """What three gauges showed after small moves of the ball, a round of three at a time.
@@ -85,9 +77,9 @@ class GaugeTrial:
         return np.concatenate([self.moved_mm, np.ones((len(self.moved_mm), 1))], axis=1)
 
     @property
-    def findings(self) -> tuple[TrialFinding, ...]:
-        """What is wrong with the gauges, if it is no chance; nothing if they are as they should be."""
-        return () if self.may_be_chance else judge_response(self.response)
+    def findings(self) -> dict[GaugeMistake, list[int]]:
+        """What is wrong with which gauges, if it is no chance; nothing if they are as they should be."""
+        return {} if self.may_be_chance else judge_response(self.response)
 
     @property
     def may_be_chance(self) -> bool:
@@ -104,12 +96,15 @@ class GaugeTrial:
         return variance_ratio_exceedance(unknowns, freedom, ratio) > CHANCE
 
 
-def judge_response(response: Array) -> tuple[TrialFinding, ...]:
-    """What is wrong with the gauges by their response (3, 3); nothing if they are as they should be."""
+def judge_response(response: Array) -> dict[GaugeMistake, list[int]]:
+    """What is wrong with which gauges, by their response (3, 3); nothing if they are as they should be.
+
+    Gauges have the numbers of their base axes.
+    """
     size = np.linalg.norm(response, axis=1)
     # Of fewer than three gauges the axes are less certain: these are judged once the others live.
     if dead := np.flatnonzero(~(size >= LEAST_RESPONSE_INCHES)).tolist():
-        return (TrialFinding(GaugeMistake.DEAD, tuple(dead)),)
+        return {GaugeMistake.DEAD: dead}
     axes, signs = _best_assignment(response / size[:, None])
     groups = {
         GaugeMistake.INCHES: [gauge for gauge in range(3) if size[gauge] < LEAST_RESPONSE],
@@ -117,7 +112,7 @@ def judge_response(response: Array) -> tuple[TrialFinding, ...]:
         GaugeMistake.EXCHANGED: [gauge for gauge, axis in enumerate(axes) if gauge != axis],
         GaugeMistake.REVERSED: [gauge for gauge, sign in enumerate(signs) if sign < 0],
     }
-    return tuple(TrialFinding(mistake, tuple(gauges)) for mistake, gauges in groups.items() if gauges)
+    return {mistake: gauges for mistake, gauges in groups.items() if gauges}
 
 
 def _best_assignment(followed: Array) -> tuple[tuple[int, ...], tuple[int, ...]]:

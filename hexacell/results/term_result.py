@@ -1,7 +1,8 @@
 """What an identification found beside the geometry, as data, and what of it a controller is to correct."""
 
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -72,25 +73,12 @@ NOTHING_FOUND = FoundTerms()
 
 def term_results(found: Identification) -> tuple[TermResult, ...]:
     """What was found of all terms that were offered."""
-    taken = {}
+    taken: dict[str, dict[str, Any]] = {}
     if (terms := found.terms) is not None:
-        taken = {one.name: (one.unit, *map(joints_of, terms.of(one.name))) for one in terms.terms}
-    results = []
-    for tried in found.tried_terms:
-        unit, values, sigma = taken.get(tried.name, ("", None, None))
-        result = TermResult(
-            name=tried.name,
-            finding=tried.finding,
-            log_factor=tried.log_factor,
-            predicted=None if np.isnan(tried.predicted) else tried.predicted,
-            rival=tried.rival,
-            told_by=tried.told_by,
-            unit=unit,
-            values=values,
-            sigma=sigma,
-        )
-        results.append(result)
-    return tuple(results)
+        for one in terms.terms:
+            values, sigma = map(joints_of, terms.of(one.name))
+            taken[one.name] = {"unit": one.unit, "values": values, "sigma": sigma}
+    return tuple(TermResult(**asdict(tried), **taken.get(tried.name, {})) for tried in found.tried_terms)
 
 
 def known_terms(offered: Iterable[ModelTerm], results: Iterable[TermResult]) -> tuple[ModelTerm, ...]:

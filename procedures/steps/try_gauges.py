@@ -11,7 +11,7 @@ from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import deviation_of
 from hexacell.noise.allowances import Allowances
-from hexacell.noise.gauge_trial import GaugeMistake, GaugeTrial, TrialFinding
+from hexacell.noise.gauge_trial import GaugeMistake, GaugeTrial
 from procedures.resources.run_resources import RunResources
 from procedures.run.keys import ThreeNumbers
 from procedures.run.set_state import SetState
@@ -76,7 +76,7 @@ class Try(StepOfSet):
         trial = trial_of(run.calibration.known(state).allowances, state.set(self.at))
         if trial.findings:
             gauges = sorted(run.settings.gauges, key=lambda gauge: gauge.axis)
-            errors = [_mistake(finding, gauges, trial.response) for finding in trial.findings]
+            errors = [_mistake(*found, gauges, trial.response) for found in trial.findings.items()]
             raise joined("the gauges do not answer as they are mounted by the cell file", errors)
         x, y, z = (deviation_of(row) for row in trial.response)
         return GaugesTried(at=self.at, response=(x, y, z))
@@ -91,12 +91,14 @@ def trial_of(allowances: Allowances, measured: SetState) -> GaugeTrial:
     return GaugeTrial(allowances.ball_at(Pose(*zero.pose)).motion(joints), shown)
 
 
-def _mistake(finding: TrialFinding, gauges: Sequence[GaugeSettings], response: Array) -> MountingError:
+def _mistake(
+    mistake: GaugeMistake, concerned: Sequence[int], gauges: Sequence[GaugeSettings], response: Array
+) -> MountingError:
     """What is wrong with some gauges, what they showed, and what to do."""
-    named = [gauges[number] for number in finding.gauges]
-    of_one, of_several, action = MISTAKES[finding.mistake]
+    named = [gauges[number] for number in concerned]
+    of_one, of_several, action = MISTAKES[mistake]
     problem = of_several if len(named) > 1 else of_one
-    shown = "; ".join(f"{gauges[n].name} showed {_numbers(response[n])}" for n in finding.gauges)
+    shown = "; ".join(f"{gauges[n].name} showed {_numbers(response[n])}" for n in concerned)
     return MountingError(
         f"{problem}: while the ball moved by 1 mm along x, y and z in turn, {shown} mm",
         subject=f"gauge{'s' if len(named) > 1 else ''} {', '.join(gauge.name for gauge in named)}",

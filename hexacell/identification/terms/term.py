@@ -44,7 +44,7 @@ class TermFinding:
     Attributes:
         log_factor: logarithm of the Bayes factor, beside the terms that were taken before it.
         predicted: by how much the logarithm of the density of points' records, predicted from all other
-            points, is higher with it; NaN where that was not asked.
+            points, is higher with it; None where that was not asked.
         rival: the term that it cannot be told from.
         told_by: the records that would tell, in words.
     """
@@ -52,7 +52,7 @@ class TermFinding:
     name: str
     finding: Finding
     log_factor: float
-    predicted: float = np.nan
+    predicted: float | None = None
     rival: str = ""
     told_by: str = ""
 

@@ -40,12 +40,8 @@ FARTHEST = 1e9
 logging.getLogger("cantools").addHandler(logging.NullHandler())
 
 
-@dataclass(frozen=True, slots=True)
-class FrameId:
-    """The identifier of a frame on the bus."""
-
-    number: int
-    is_extended: bool
+FrameId = tuple[int, bool]
+"""The identifier of a frame on the bus, and whether it is an extended one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +118,7 @@ def _signal(
             subject=settings.file,
             action="Correct measuring_step_nm or counts_per_turn in the cell file",
         )
-    frame = FrameId(message.frame_id, bool(message.is_extended_frame))
+    frame = message.frame_id, bool(message.is_extended_frame)
     return PositionSignal(leg, name, frame, scale, message, signal)
 
 
@@ -179,8 +175,8 @@ class DbcSession(BankSession):
 
     def start(self) -> None:
         """Listen to all six, and take a first sample."""
-        for frame in self._frames:
-            self._bus.network.subscribe(frame.number, self._receiver(frame))
+        for number, is_extended in self._frames:
+            self._bus.network.subscribe(number, self._receiver((number, is_extended)))
         self._sample()
 
     def close(self) -> None:
@@ -188,7 +184,7 @@ class DbcSession(BankSession):
         self._bus.close()
 
     def _accepts(self, message: can.Message) -> bool:
-        frame = FrameId(message.arbitration_id, message.is_extended_id)
+        frame = message.arbitration_id, message.is_extended_id
         self._hears_others = self._hears_others or frame not in self._frames
         return message.is_rx and not message.is_remote_frame and frame in self._frames
 

@@ -24,7 +24,7 @@ from hexacell.cell.fields import (
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.mechanisms.encoder_scales import WithEncoderScales
-from hexacell.kinematics.mechanisms.gough_stewart import GOUGH_STEWART_PARAMETERS, ScrewLegs, Screws
+from hexacell.kinematics.mechanisms.gough_stewart import GOUGH_STEWART_PARAMETERS, ScrewLegs
 from hexacell.plugins import Group, created
 
 StartupWord = Literal["reset-estop", "switch-on", "home"]
@@ -99,9 +99,9 @@ def mechanism_of(name: str, *, encoder_scales: bool) -> Mechanism:
 def _screw_legs(
     settings: ScrewSettings, base: Six[PointInRange], platform: Six[PointInRange], *, encoder_scales: bool
 ) -> Mechanism:
-    screws = Screws(settings.lead_mm, np.array(settings.base_axes), np.array(settings.platform_axes))
+    axes = np.array(settings.base_axes), np.array(settings.platform_axes)
     drawn: dict[str, ArrayLike] = {"base": base, "platform": platform, "offset": np.zeros(6)}
-    legs = ScrewLegs(screws, Geometry.of(GOUGH_STEWART_PARAMETERS, drawn))
+    legs = ScrewLegs(settings.lead_mm, *axes, Geometry.of(GOUGH_STEWART_PARAMETERS, drawn))
     return WithEncoderScales(legs) if encoder_scales else legs
 
 

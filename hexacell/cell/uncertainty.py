@@ -41,23 +41,15 @@ SIZES_OF_GRADES: Mapping[Grade, Mapping[str, float]] = {
         "rail_sag_um": 20.0,
         "encoder_eccentricity_mdeg": 10.0,
     },
-    "ideal": {
-        "common_encoder_scale_um_m": 0.0,
-        "encoder_scale_um_m": 0.0,
-        "encoder_eccentricity_mdeg": 0.0,
-        "stop_repeatability_mdeg": 0.0,
-        "rail_direction_mrad": 0.0,
-        "rail_wave_short_um": 0.0,
-        "rail_wave_long_um": 0.0,
-        "rail_sag_um": 0.0,
-        "stop_repeatability_um": 0.0,
-        "ball_roundness_um": 0.0,
-        "temperature_at_work_k": 0.0,
-        "temperature_measuring_k": 0.0,
-        "thermometers_k": 0.0,
-        "expansion_percent": 0.0,
-        "load_n": 0.0,
-    },
+    "ideal": dict.fromkeys(
+        (
+            *("common_encoder_scale_um_m", "encoder_scale_um_m", "encoder_eccentricity_mdeg"),
+            *("stop_repeatability_mdeg", "rail_direction_mrad", "rail_wave_short_um", "rail_wave_long_um"),
+            *("rail_sag_um", "stop_repeatability_um", "ball_roundness_um", "temperature_at_work_k"),
+            *("temperature_measuring_k", "thermometers_k", "expansion_percent", "load_n"),
+        ),
+        0.0,
+    ),
 }
 """Where the sizes of a grade differ from the defaults of the keys, which are those of ``precision``."""
 

@@ -35,24 +35,17 @@ class LegLimits:
     platform_cones: Array
     distance_mm: float
 
-    def spare_angles(self, legs: Legs) -> Array:
-        """Angles (n, 2, 6), rad, that passive joints have left, at the base and at the platform."""
-        along = legs.directions
-        at_base = self.base_cones - angles_between(legs.in_carriers(along), self.base_axes)
-        at_platform = self.platform_cones - angles_between(along @ legs.rotations, self.platform_axes)
-        spare = np.empty((len(at_base), 2, 6))
-        spare[:, 0], spare[:, 1] = at_base, at_platform
-        return spare
-
     def margins(self, legs: Legs) -> Array:
         """By how much n poses keep these limits, (n, m), negative beyond them.
 
-        The spare angles of the passive joints, rad, then the legs' spare distance, mm, if it has a limit.
+        The angles, rad, that the passive joints have left, six at the base and six at the platform, then
+        the legs' spare distance, mm, if it has a limit.
         """
-        angles = self.spare_angles(legs).reshape(-1, 12)
-        if self.distance_mm == 0.0:
-            return angles
-        return np.column_stack([angles, legs.smallest_distance() - self.distance_mm])
+        along = legs.directions
+        at_base = self.base_cones - angles_between(legs.in_carriers(along), self.base_axes)
+        at_platform = self.platform_cones - angles_between(along @ legs.rotations, self.platform_axes)
+        distances = [legs.smallest_distance() - self.distance_mm] if self.distance_mm else []
+        return np.column_stack([at_base, at_platform, *distances])
 
     def keeps(self, legs: Legs, wanted: Array | float = 0.0) -> Mask:
         """At which of n poses all :meth:`margins` are at least those wanted (m,).

@@ -10,7 +10,6 @@ import socket
 import sqlite3
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
@@ -209,18 +208,10 @@ def _reason(error: Exception) -> str:
     return " ".join(str(getattr(error, "orig", None) or error).split())
 
 
-@dataclass(frozen=True, slots=True)
-class SharedDocument:
-    """A document of one cell; ``place`` is the computer and folder of its runs."""
+def shared_documents(url: str, kind: DocumentKind) -> Sequence[tuple[str, str, str, bytes]]:
+    """All documents of one kind, each as place, cell, run and content; empty where no cell has put any.
 
-    place: str
-    cell: str
-    run: str
-    content: bytes
-
-
-def shared_documents(url: str, kind: DocumentKind) -> tuple[SharedDocument, ...]:
-    """All documents of one kind, by cell, place and run; empty where no cell has put anything there.
+    They are by cell, place and run; the place is the computer and folder of a cell's runs.
 
     Raises:
         ArchiveUnavailable: it cannot be read.
@@ -235,8 +226,8 @@ def shared_documents(url: str, kind: DocumentKind) -> tuple[SharedDocument, ...]
     try:
         with open_engine(address).connect() as connection:
             if not inspect(connection).has_table(ARCHIVE_TABLE.name):
-                return ()
-            return tuple(SharedDocument(*row) for row in connection.execute(query))
+                return []
+            return [(place, cell, run, content) for place, cell, run, content in connection.execute(query)]
     except SQLAlchemyError as error:
         raise ArchiveUnavailable(
             f"the archive cannot be read ({_reason(error)})",

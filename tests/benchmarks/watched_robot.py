@@ -69,7 +69,7 @@ class WatchedRobot(VirtualRobot):
         seen.turn = max(seen.turn, float(np.degrees(np.abs(command.turns()[0]))))
         seen.axis_is_kept &= bool(limits.axes.allow(command)[0])
         seen.joint_is_kept &= bool(limits.allow_joints(joints)[0])
-        seen.spare = min(seen.spare, float(np.degrees(limits.legs.spare_angles(legs).min())))
+        seen.spare = min(seen.spare, float(np.degrees(limits.legs.margins(legs)[:, :12].min())))
         seen.distance_mm = min(seen.distance_mm, float(legs.smallest_distance()[0]))
 
 

@@ -177,7 +177,3 @@ def _wait(condition: Callable[[], bool], limit_s: float, poll_s: float, problem:
         if time.monotonic() > deadline:
             raise UsageError(f"{problem} within {limit_s:g} s", action="Look at it; the machine is off")
         time.sleep(poll_s)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

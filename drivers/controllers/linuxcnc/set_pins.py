@@ -178,7 +178,3 @@ def _halcmd(arguments: Sequence[str], given: str = "") -> str:
             action="See that LinuxCNC runs here, and that you may talk to it",
         )
     return done.stdout
-
-
-if __name__ == "__main__":
-    sys.exit(main())

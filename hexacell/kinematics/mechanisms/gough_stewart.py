@@ -114,21 +114,6 @@ class GoughStewart(JointedLegs):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Screws:
-    """The screws of six legs.
-
-    Attributes:
-        lead_mm: of one turn; above zero for right-handed threads.
-        base_axes: (6, 3) of the joints on the base that the legs turn about, in the base frame.
-        platform_axes: (6, 3) likewise on the platform, in the platform frame.
-    """
-
-    lead_mm: float
-    base_axes: Array
-    platform_axes: Array
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class _Corrections:
     """What the screws add to the legs (n, 6), mm, and how that changes.
 
@@ -147,15 +132,21 @@ class ScrewLegs(GoughStewart):
     Derivatives by parameters are those with the axes where they are: in the convention's frames no free
     parameter turns them.
 
+    Args:
+        lead_mm: of one turn of the screws; above zero for right-handed threads.
+        base_axes: (6, 3) of the joints on the base that the legs turn about, in the base frame.
+        platform_axes: (6, 3) likewise on the platform, in the platform frame.
+        drawing: the geometry for whose frames the axes are stated.
+
     Raises:
         UsageError: the joints of legs 1, 3 and 5 on a plate fix no frame.
     """
 
-    def __init__(self, screws: Screws, drawing: Geometry) -> None:
+    def __init__(self, lead_mm: float, base_axes: Array, platform_axes: Array, drawing: Geometry) -> None:
         _, change = self.normalize_frames(drawing)
-        self._radius_mm = screws.lead_mm / (2.0 * np.pi)
-        self._base_axes = screws.base_axes @ change.base.T
-        self._platform_axes = screws.platform_axes @ change.platform.T
+        self._radius_mm = lead_mm / (2.0 * np.pi)
+        self._base_axes = base_axes @ change.base.T
+        self._platform_axes = platform_axes @ change.platform.T
 
     def residual_and_jacobian(
         self, geometry: Geometries, poses: PoseBatch, joints: Array

@@ -108,13 +108,13 @@ def limits(cone=30.0, distance=0.0):
 
 
 def test_a_platform_joint_turns_as_far_as_the_platform_does_but_not_about_its_leg() -> None:
-    spare = np.degrees(limits().spare_angles(turned([1, 0, 0], 12.0)))
-    np.testing.assert_allclose(spare[0, 0], 20.0, atol=1e-6)
-    np.testing.assert_allclose(spare[0, 1], 18.0, atol=1e-6)
+    spare = np.degrees(limits().margins(turned([1, 0, 0], 12.0)))
+    np.testing.assert_allclose(spare[0, :6], 20.0, atol=1e-6)
+    np.testing.assert_allclose(spare[0, 6:], 18.0, atol=1e-6)
     assert are_kept(limits(), turned([1, 0, 0], 29.9))[0]
     assert not are_kept(limits(), turned([1, 0, 0], 30.1))[0]
     assert not are_kept(limits(), turned([1, 0, 0], 29.9), np.radians(0.2))[0]
-    np.testing.assert_allclose(np.degrees(limits().spare_angles(turned([0, 0, 1], 80.0)))[0, 1], 30.0)
+    np.testing.assert_allclose(np.degrees(limits().margins(turned([0, 0, 1], 80.0)))[0, 6:], 30.0)
 
 
 def test_legs_that_come_too_near_are_seen():

@@ -11,7 +11,7 @@ from hexacell.cell.loader import load_cell
 from hexacell.conformance import MechanismConformance, MechanismExample
 from hexacell.conformance.frame_checks import LEAST_DETERMINED, _by_parameters
 from hexacell.kinematics.forward import apply_twist
-from hexacell.kinematics.mechanisms.gough_stewart import GoughStewart, ScrewLegs, Screws
+from hexacell.kinematics.mechanisms.gough_stewart import GoughStewart, ScrewLegs
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.model import robot_of
@@ -22,12 +22,9 @@ LARGEST_CHANGE = LEAD_MM / (2.0 * np.pi * 500.0)
 
 ROBOT = robot_of(CELL := load_cell(Path(__file__).parents[4] / "configs" / "gough-stewart.toml"))
 AROUND = np.radians(60.0 * np.arange(6.0))
-AXES = Screws(
-    LEAD_MM,
-    np.stack([-np.sin(AROUND), np.cos(AROUND), 0.1 * np.ones(6)], axis=-1),
-    np.stack([np.cos(AROUND), 2.0 * np.sin(AROUND), 0.3 * np.sin(2.0 * AROUND)], axis=-1),
-)
-MECHANISM = ScrewLegs(AXES, ROBOT.drawing)
+BASE_AXES = np.stack([-np.sin(AROUND), np.cos(AROUND), 0.1 * np.ones(6)], axis=-1)
+PLATFORM_AXES = np.stack([np.cos(AROUND), 2.0 * np.sin(AROUND), 0.3 * np.sin(2.0 * AROUND)], axis=-1)
+MECHANISM = ScrewLegs(LEAD_MM, BASE_AXES, PLATFORM_AXES, ROBOT.drawing)
 degrees = st.floats(-30.0, 30.0)
 poses = st.builds(
     Pose, st.floats(-100, 100), st.floats(-100, 100), st.floats(700, 850), degrees, degrees, degrees
@@ -97,8 +94,8 @@ def test_each_leg_is_corrected_by_its_formula(pose: Pose) -> None:
         rotation = batch.rotations[0]
         vector = batch.positions[0] + rotation @ geometry["platform"][leg] - geometry["base"][leg]
         u = vector / np.linalg.norm(vector)
-        on_base = np.cross(u, np.cross(AXES.base_axes[leg], u))
-        on_platform = np.cross(rotation @ AXES.platform_axes[leg], u)
+        on_base = np.cross(u, np.cross(BASE_AXES[leg], u))
+        on_platform = np.cross(rotation @ PLATFORM_AXES[leg], u)
         cosine = on_base @ on_platform / (np.linalg.norm(on_base) * np.linalg.norm(on_platform))
         added = LEAD_MM * np.arcsin(cosine) / (2.0 * np.pi)
         expected = np.linalg.norm(vector) + added - geometry["offset"][leg]
@@ -106,7 +103,7 @@ def test_each_leg_is_corrected_by_its_formula(pose: Pose) -> None:
 
 
 def test_without_a_lead_it_is_the_platform_itself() -> None:
-    without = ScrewLegs(Screws(0.0, AXES.base_axes, AXES.platform_axes), ROBOT.drawing)
+    without = ScrewLegs(0.0, BASE_AXES, PLATFORM_AXES, ROBOT.drawing)
     batch = PoseBatch.of([Pose(10.0, 20.0, 780.0, 5.0, -10.0, 15.0)])
     np.testing.assert_array_equal(
         without.inverse(ROBOT.drawing, (), batch), GoughStewart().inverse(ROBOT.drawing, (), batch)

@@ -121,9 +121,8 @@ class IdentificationResult(Frozen):
 
     def estimate(self, parameters: ParameterSet) -> result.GeometryEstimate:
         """What the acceptance gates need."""
-        return result.GeometryEstimate(
-            self.identified(parameters), np.array(self.covariance), self.termination, self.undetermined
-        )
+        covariance = np.array(self.covariance)
+        return result.GeometryEstimate(self.identified(parameters), covariance, self.termination)
 
     @property
     def residuals(self) -> ChiSquareTest:

@@ -76,21 +76,21 @@ def as_written(
     corrections, left = corrections_for(terms, settings, robot.holds, robot.corrections)
     if left:
         identified = absorbing(settings, robot, identified, left)
-    choice = choose_frames(
+    geometry, displacement = choose_frames(
         robot.mechanism,
         robot.branch,
         taught=robot.taught,
         new=identified,
         poses=robot.frames.inverse().poses(Task.of(settings, robot, robot.belief()).poses),
     )
-    moved = TaskDisplacement.of(choice.displacement, settings.acceptance)
+    moved = TaskDisplacement.of(displacement, settings.acceptance)
     if corrections is not None and (corrections.play_mm, corrections.compliance_um_n) != (NONE, NONE):
         # Their weight is stated in the drawing's frames.
-        drawn, own = (robot.mechanism.normalize_frames(one)[1] for one in (robot.drawing, choice.geometry))
+        drawn, own = (robot.mechanism.normalize_frames(one)[1] for one in (robot.drawing, geometry))
         x, y, z = (own.base.T @ drawn.base @ corrections.weight_direction).round(9).tolist()
         centre = corrections.weight_centre_mm
         if centre is not None:
             u, v, w = (own.platform.T @ drawn.platform @ centre).round(6).tolist()
             centre = u, v, w
         corrections = replace(corrections, weight_direction=(x, y, z), weight_centre_mm=centre)
-    return WrittenGeometry(choice.geometry, moved, corrections)
+    return WrittenGeometry(geometry, moved, corrections)

@@ -24,7 +24,7 @@ THREE_MM = Tolerances({"S": 3.0, "B": 3.0, "l": 3.0})
 def is_refused(built: Geometry, tolerances: Tolerances) -> bool:
     """Of a geometry that is known exactly."""
     normal = MECHANISM.normalize_frames(built)[0]
-    exact = GeometryEstimate(normal, np.zeros((len(built.vector),) * 2), Termination.STEP, ())
+    exact = GeometryEstimate(normal, np.zeros((len(built.vector),) * 2), Termination.STEP)
     return bool(tolerance_violations(exact, MECHANISM, DRAWING, tolerances))
 
 

@@ -27,7 +27,7 @@ from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, FrameFreedom, Mechanism
 from hexacell.kinematics.pose import FrameTransform, PoseBatch
-from hexacell.kinematics.rotations import Array, Mask
+from hexacell.kinematics.rotations import Array
 
 ALIGNMENT_ITERATIONS, CHOICE_ITERATIONS = 20, 50
 ALIGNMENT_TOLERANCE, CHOICE_TOLERANCE = 1e-12, 1e-13
@@ -131,30 +131,17 @@ def frame_derivatives(poses: PoseBatch) -> Array:
     return design
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class FrameChoice:
-    """The frames of a new geometry, and how far the taught poses move nevertheless.
-
-    Attributes:
-        geometry: the new geometry in the chosen frames.
-        frames: from the mechanism's convention to the chosen frames.
-        found: (n,) which of the taught poses both geometries reach; the others did not count.
-        displacement: of the poses found, at equal joint variables: mm and rad.
-    """
-
-    geometry: Geometry
-    frames: FrameTransform
-    found: Mask
-    displacement: PoseErrors
-
-
 def choose_frames(
     mechanism: Mechanism, branch: Branch, *, taught: Geometry, new: Geometry, poses: PoseBatch
-) -> FrameChoice:
-    """The frames in which the ``new`` geometry, in the frame convention, moves n taught poses least.
+) -> tuple[Geometry, PoseErrors]:
+    """The ``new`` geometry, in the frame convention, in the frames in which n taught poses move least.
 
     The poses are in the frames of the geometry with which they were ``taught``. If both geometries reach no
     pose, these frames are kept, as the mechanism's convention has them.
+
+    Returns:
+        The geometry in these frames, and how far the poses that both geometries reach move nevertheless, at
+        equal joint variables.
     """
     normalized, convention = mechanism.normalize_frames(taught)
     robot = CommandedRobot(mechanism, branch, commanding=normalized, actual=new)
@@ -165,12 +152,8 @@ def choose_frames(
     if len(targets):
         freedom = replace(mechanism.frame_freedom, base="")  # gauges measure along the axes of the base
         frames = frames.then(closest_frames(freedom, length, frames.poses(reached_poses), targets))
-    return FrameChoice(
-        mechanism.change_frames(new, frames),
-        frames,
-        reached.found,
-        PoseErrors.of_squares(pose_errors(frames.poses(reached_poses), targets) ** 2),
-    )
+    displacement = PoseErrors.of_squares(pose_errors(frames.poses(reached_poses), targets) ** 2)
+    return mechanism.change_frames(new, frames), displacement
 
 
 def closest_frames(

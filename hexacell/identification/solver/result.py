@@ -110,15 +110,11 @@ class Solution:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GeometryEstimate:
-    """An identified geometry with the covariance (P, P), mm^2, of its parameters.
-
-    About the ``undetermined`` parameters the data have almost no information.
-    """
+    """An identified geometry with the covariance (P, P), mm^2, of its parameters."""
 
     geometry: Geometry
     covariance: Array
     termination: Termination
-    undetermined: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,7 +195,7 @@ class Identification:
     @property
     def estimate(self) -> GeometryEstimate:
         """The geometry with its uncertainty."""
-        return GeometryEstimate(self.geometry, self.covariance, self.termination, self.undetermined)
+        return GeometryEstimate(self.geometry, self.covariance, self.termination)
 
     @property
     def poses(self) -> PoseBatch:

@@ -28,7 +28,7 @@ TO_FLOOR = FrameTransform(
 def estimate(geometry: Geometry, sigma: float = 0.0) -> GeometryEstimate:
     normal = MECHANISM.normalize_frames(geometry)[0]
     covariance = sigma**2 * np.eye(len(HEXAGLIDE_PARAMETERS))
-    return GeometryEstimate(normal, covariance, Termination.STEP, ())
+    return GeometryEstimate(normal, covariance, Termination.STEP)
 
 
 def names(found: GeometryEstimate, drawing: Geometry, tolerances: Tolerances) -> list[str]:

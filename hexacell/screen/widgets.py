@@ -28,20 +28,12 @@ class TextPanel(Static):
     """Text without markup; its class says how urgent it is."""
 
     def __init__(self, text: str = "", *, id: str | None = None, classes: str | None = None) -> None:  # noqa: A002 - as in every widget
-        text = printable(text)
-        super().__init__(text, id=id, classes=classes, markup=False)
-        self._text, self._urgency = text, Urgency.CALM
-
-    @property
-    def text(self) -> str:
-        """What it shows."""
-        return self._text
+        super().__init__(printable(text), id=id, classes=classes, markup=False)
+        self._urgency = Urgency.CALM
 
     def show(self, text: str, urgency: Urgency = Urgency.CALM) -> None:
         """Show a text."""
-        text = printable(text)
-        if text != self._text:
-            self._text = text
+        if (text := printable(text)) != self.content:
             self.update(text)
         if urgency is not self._urgency:
             self._urgency = urgency
@@ -56,11 +48,6 @@ class TextList(VerticalScroll):
         self._panel, self._follows = TextPanel(), follows
         self._count, self._is_at_end = 0, False
         super().__init__(self._panel, id=id, classes=classes)
-
-    @property
-    def text(self) -> str:
-        """What it shows, scrolled out of sight or not."""
-        return self._panel.text
 
     def show(self, lines: Sequence[str]) -> None:
         """Show these lines."""

@@ -87,10 +87,10 @@ async def test_no_widget_has_any() -> None:
         panel, rows = app.query_one(TextPanel), app.query_one(RowList)
         rows.show([("1", HOSTILE)])
         await pilot.pause()
-        assert raw_signs(f"{panel.render()}{rows.options[0].prompt}{panel.text}") == []
+        assert raw_signs(f"{panel.render()}{rows.options[0].prompt}{panel.content}") == []
         panel.show(f"again {HOSTILE}")
         assert raw_signs(str(panel.render())) == []
-        assert "[red]" in panel.text
+        assert "[red]" in str(panel.content)
         await asyncio.sleep(0)
 
 

@@ -14,7 +14,7 @@ from hexacell.run_process.client import LOST
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.child import Preflight
 from hexacell.screen.overlays import ConfirmOverlay, FaultOverlay, QuestionOverlay
-from hexacell.screen.widgets import TextList, TextPanel
+from hexacell.screen.widgets import TextPanel
 from hexacell.text.screens.measuring import RESUMABLE
 from hexacell.text.screens.views import ChecklistItem, Mark
 from procedures.engine.command_loop import Status
@@ -40,7 +40,7 @@ PLACED_AT, IDENTIFIED, PROPOSED = 6, 333, 455
 
 def shown(pilot: Pilot[int]) -> str:
     """All text of the screen in front."""
-    return "\n".join(panel.text for panel in pilot.app.screen.query(TextPanel))
+    return "\n".join(str(panel.content) for panel in pilot.app.screen.query(TextPanel))
 
 
 async def press(pilot: Pilot[int], *keys: str) -> None:
@@ -229,7 +229,7 @@ async def test_a_run_begins_once_everything_holds_that_must_hold(cell, run, open
             await press(pilot, "enter")
         wanted = ["optimise", "check", "quick", "resume", "length", "optimise with length check"]
         assert workplace.checked == wanted
-        listed = pilot.app.screen.query_one("#checklist", TextList).text
+        listed = str(pilot.app.screen.query_one("#checklist TextPanel", TextPanel).content)
         assert "NO  gauge y: it answers in inch" in listed
         assert "-> Press the in/mm key" in listed
         assert workplace.begun == []

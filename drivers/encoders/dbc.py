@@ -12,7 +12,7 @@ from codecs import BOM_UTF8
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import can
 
@@ -40,8 +40,11 @@ FARTHEST = 1e9
 logging.getLogger("cantools").addHandler(logging.NullHandler())
 
 
-FrameId = tuple[int, bool]
-"""The identifier of a frame on the bus, and whether it is an extended one."""
+class FrameId(NamedTuple):
+    """The identifier of a frame on the bus."""
+
+    number: int
+    is_extended: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +121,7 @@ def _signal(
             subject=settings.file,
             action="Correct measuring_step_nm or counts_per_turn in the cell file",
         )
-    frame = message.frame_id, bool(message.is_extended_frame)
+    frame = FrameId(message.frame_id, bool(message.is_extended_frame))
     return PositionSignal(leg, name, frame, scale, message, signal)
 
 
@@ -175,8 +178,8 @@ class DbcSession(BankSession):
 
     def start(self) -> None:
         """Listen to all six, and take a first sample."""
-        for number, is_extended in self._frames:
-            self._bus.network.subscribe(number, self._receiver((number, is_extended)))
+        for frame in self._frames:
+            self._bus.network.subscribe(frame.number, self._receiver(frame))
         self._sample()
 
     def close(self) -> None:
@@ -184,7 +187,7 @@ class DbcSession(BankSession):
         self._bus.close()
 
     def _accepts(self, message: can.Message) -> bool:
-        frame = message.arbitration_id, message.is_extended_id
+        frame = FrameId(message.arbitration_id, message.is_extended_id)
         self._hears_others = self._hears_others or frame not in self._frames
         return message.is_rx and not message.is_remote_frame and frame in self._frames
 

@@ -130,7 +130,9 @@ class RecoverySettings(Section):
     """How failures and interruptions are handled."""
 
     agreement_mm: Positive = key(
-        0.05, "largest change of a reference, gauges and encoders, with which a set continues, mm"
+        0.05,
+        "largest change of a reference, gauges and encoders, with which a set continues, mm; the measured "
+        "noise may make it smaller or larger",
     )
     wait_s: NotNegative = key(2.0, "wait before a failed device is tried again, s")
     away_minutes: Positive = key(

@@ -29,9 +29,10 @@ from hexacell.robot.stated import gauge_travel_of
 SIGMAS = 5.0
 """Standard deviations up to which a difference is chance, at some hundred stops of six joints each."""
 
-UNCHANGED = 1e-4
-"""Probability by noise below which gauges were moved meanwhile: along each axis alone they may differ by no
-more than chance, where encoders hardly tell how the ball moved, and yet by nothing that joints could do."""
+UNCHANGED = 0.05
+"""Probability by noise below which gauges may have been moved meanwhile: along each axis alone they may
+differ by no more than chance, where encoders hardly tell how the ball moved, and yet by nothing that joints
+could do. To measure a set again in vain costs minutes, gauges that were moved unnoticed the result."""
 
 DENIED = 3.0
 """Standard deviations by which gauges must contradict an encoder that shows more than chance."""

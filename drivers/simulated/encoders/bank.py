@@ -201,4 +201,4 @@ class SimulatedDbcBank(_CanBank):
         for signal, encoder, position in zip(self._signals, self._encoders, positions, strict=True):
             data = encoder.frame(position)
             if not encoder.is_silent:
-                self.bus.send_message(signal.frame[0], data)
+                self.bus.send_message(signal.frame.number, data)

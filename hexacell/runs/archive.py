@@ -10,6 +10,7 @@ import socket
 import sqlite3
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
@@ -208,10 +209,18 @@ def _reason(error: Exception) -> str:
     return " ".join(str(getattr(error, "orig", None) or error).split())
 
 
-def shared_documents(url: str, kind: DocumentKind) -> Sequence[tuple[str, str, str, bytes]]:
-    """All documents of one kind, each as place, cell, run and content; empty where no cell has put any.
+@dataclass(frozen=True, slots=True)
+class SharedDocument:
+    """A document of one cell; ``place`` is the computer and folder of its runs."""
 
-    They are by cell, place and run; the place is the computer and folder of a cell's runs.
+    place: str
+    cell: str
+    run: str
+    content: bytes
+
+
+def shared_documents(url: str, kind: DocumentKind) -> tuple[SharedDocument, ...]:
+    """All documents of one kind, by cell, place and run; empty where no cell has put anything there.
 
     Raises:
         ArchiveUnavailable: it cannot be read.
@@ -226,8 +235,8 @@ def shared_documents(url: str, kind: DocumentKind) -> Sequence[tuple[str, str, s
     try:
         with open_engine(address).connect() as connection:
             if not inspect(connection).has_table(ARCHIVE_TABLE.name):
-                return []
-            return [(place, cell, run, content) for place, cell, run, content in connection.execute(query)]
+                return ()
+            return tuple(SharedDocument(*row) for row in connection.execute(query))
     except SQLAlchemyError as error:
         raise ArchiveUnavailable(
             f"the archive cannot be read ({_reason(error)})",

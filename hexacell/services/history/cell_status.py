@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from pydantic import ValidationError
 
@@ -22,6 +22,9 @@ from hexacell.services.history.drift_history import DriftHistory, drift_history
 from hexacell.services.history.past_runs import past_runs
 from hexacell.services.history.run_index import PastRun, RunIndex, RunSummary
 from hexacell.verdict.decision import Verdict
+
+if TYPE_CHECKING:
+    from hexacell.runs.archive import SharedDocument
 
 CLOCKS_DIFFER = timedelta(minutes=5)
 """Largest difference of the clocks of computers that share a folder."""
@@ -170,7 +173,7 @@ def fleet_cells(url: str) -> tuple[FleetCell, ...]:
     Raises:
         ArchiveUnavailable: it cannot be read.
     """
-    return tuple(cell for *_, cell in _shared(url, DocumentKind.CELL, FleetCell))
+    return tuple(cell for _, cell in _shared(url, DocumentKind.CELL, FleetCell))
 
 
 def fleet_runs(url: str) -> tuple[FleetRun, ...]:
@@ -180,8 +183,8 @@ def fleet_runs(url: str) -> tuple[FleetRun, ...]:
         ArchiveUnavailable: it cannot be read.
     """
     found = [
-        FleetRun(cell, place.partition(":")[0], run, summary)
-        for place, cell, run, summary in _shared(url, DocumentKind.SUMMARY, RunSummary)
+        FleetRun(one.cell, one.place.partition(":")[0], one.run, summary)
+        for one, summary in _shared(url, DocumentKind.SUMMARY, RunSummary)
     ]
     never = datetime.min.replace(tzinfo=UTC)
     return tuple(
@@ -189,10 +192,10 @@ def fleet_runs(url: str) -> tuple[FleetRun, ...]:
     )
 
 
-def _shared(url: str, kind: DocumentKind, model: type[Model]) -> Iterator[tuple[str, str, str, Model]]:
-    """What the cells of an archive share: place, cell, run and document; without what is newer."""
+def _shared(url: str, kind: DocumentKind, model: type[Model]) -> Iterator[tuple[SharedDocument, Model]]:
+    """What the cells of an archive share, without what a newer program has written."""
     from hexacell.runs.archive import shared_documents  # noqa: PLC0415 - SQLAlchemy only where used
 
-    for place, cell, run, content in shared_documents(url, kind):
+    for document in shared_documents(url, kind):
         with suppress(ValidationError):
-            yield place, cell, run, model.model_validate_json(content)
+            yield document, model.model_validate_json(document.content)

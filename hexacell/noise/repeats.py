@@ -73,14 +73,14 @@ class Repeats:
         changes: of readings at one pose, each with its covariance by that noise.
         is_measured: whether that noise was measured by some of them, not stated.
         seen_freedom: degrees of freedom of the stops that the encoders show.
-        residuals: of a fit with that noise; None without one.
+        residuals: of a fit with that noise, if there is one.
         significance: the probability below which they show more than the noise.
     """
 
     changes: tuple[ReferenceChange, ...]
     is_measured: bool = False
     seen_freedom: float = np.inf
-    residuals: ChiSquareTest | None = None
+    residuals: ChiSquareTest = NO_RESIDUALS
     significance: float = SIGNIFICANCE
 
     @classmethod
@@ -97,7 +97,7 @@ class Repeats:
         seen = np.inf if approaches is None else float(LEGS * (approaches.visits - 1))
         is_measured = approaches is not None and approaches.source is not None
         is_of_fit = found is not None and found.problem.noise.encoder <= noise.encoder * (1.0 + 1e-6)
-        goodness = found.goodness if found and is_of_fit else None
+        goodness = found.goodness if found and is_of_fit else NO_RESIDUALS
         return cls(tuple(changes), is_measured, seen, goodness, significance)
 
     @property
@@ -125,7 +125,7 @@ class Repeats:
 
         It counts at work even where noise of all readings explains the changes better: that is the worst.
         """
-        if not (self._is_larger() or (self.residuals is not None and self._is_larger(self.residuals))):
+        if not (self._is_larger() or self._is_larger(self.residuals)):
             return MoreScatter(0.0, self.freedom, 0.0)
         return self._likeliest(noise.encoder * SIZES, np.stack([one.by_stops for one in self.changes]))
 

@@ -68,14 +68,14 @@ class Revisit(StepOfSet):
         await run.check_gauges()
         change = run.since_reference(state, self.at, reading)
         limit_mm, joint_limit = run.settings.reference_agreement
+        is_beyond = change.exceeds(limit_mm)
         # Noise that was measured says better than a stated limit whether gauges were moved.
         is_measured = state.noise is not None and run.settings.guards.limits != "fixed"
         if (leg := change.slipped_encoder()) is not None:
             shown = slip_in_words(change, leg, run.settings.mechanism.words.joint_unit)
-        elif change.exceeds(limit_mm) or change.is_unlikely(0.0 if is_measured else limit_mm):
-            beyond = f"{limit_mm:g} mm" if change.exceeds(limit_mm) else "chance explains"
+        elif is_beyond or change.is_unlikely(0.0 if is_measured else limit_mm):
             shown = f"the gauges show {in_words(change.unexplained_mm)} that the encoders do not explain"
-            shown += f", more than {beyond}"
+            shown += f", more than {f'{limit_mm:g} mm' if is_beyond else 'chance explains'}"
         elif (leg := change.leg_beyond(joint_limit)) is not None:
             shown = f"q{leg + 1} shows {change.joints[leg]:+.3f}, more than {joint_limit:g}"
         else:

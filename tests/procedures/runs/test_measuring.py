@@ -1,16 +1,22 @@
 """Failures while measuring, a robot that is not where the run left it, and how the run goes on or ends."""
 
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import AsyncMock
 
+import numpy as np
 import pytest
 
 from hexacell.cell.recovery import Action
 from hexacell.errors import AnswerNeeded, ExitCode, LimitError
 from hexacell.kinematics.pose import Pose
+from hexacell.noise.allowances import ReferenceChange
 from procedures.engine.commands import UnattendedOperator
+from procedures.run.keys import Phase, SetKey
 from procedures.run.trips import Guard, GuardTripped
 from procedures.steps import events
 from procedures.steps.move import Move
+from procedures.steps.revisit import Revisit
 from tests.procedures.runs.listening import happened, on, run_until
 
 
@@ -27,6 +33,35 @@ async def test_a_slipped_gauge_stops_the_run_and_the_point_is_measured_again(rec
     assert rig.controller.log[-1] == "stop"
     await run_until(rig, events.SetClosed)
     assert [str(event.at) for event in happened(rig, events.SetInvalidated)] == ["P2"]
+
+
+@pytest.mark.parametrize(
+    ("noise", "limits", "unexplained_mm", "is_kept"),
+    [
+        (object(), "measured", 0.03, False),
+        (object(), "fixed", 0.03, True),
+        (None, "measured", 0.03, True),
+        (None, "measured", 0.06, False),
+    ],
+    ids=["measured noise", "walls", "stated noise", "stated noise, farther"],
+)
+async def test_gauges_that_may_have_been_moved_meanwhile_are_told_by_the_noise_if_it_is_measured(
+    recording, noise, limits, unexplained_mm, is_kept
+) -> None:
+    reading = next(one for one in recording.history if isinstance(one, events.RecordTaken)).reading
+    change = ReferenceChange(
+        np.full(3, unexplained_mm), np.eye(3), np.eye(3), np.ones(3), np.zeros(6), 0.0, probability=0.01
+    )
+    settings = SimpleNamespace(reference_agreement=(0.05, 0.05), guards=SimpleNamespace(limits=limits))
+    run: Any = SimpleNamespace(
+        settings=settings,
+        read=AsyncMock(return_value=reading),
+        check_gauges=AsyncMock(),
+        since_reference=lambda *_: change,
+    )
+    state: Any = SimpleNamespace(noise=noise)
+    told = await Revisit(at=SetKey(phase=Phase.IDENTIFY, point=1)).perform(run, state)
+    assert isinstance(told, events.ReferenceConfirmed if is_kept else events.SetInvalidated)
 
 
 @pytest.mark.parametrize("slip_mm", [0.05, -0.3])

@@ -18,6 +18,8 @@ from unittest.mock import AsyncMock
 import pytest
 from hypothesis import settings
 
+from tests.turns import LONG_TESTS, TURN, TURNS, not_there, turn, whose_turn_it_is_not
+
 GRACE_S = 90.0  # for what is on its way out when a test returns; only a test that fails waits so long
 TESTS = Path(__file__).parent
 BENCHMARKS = TESTS / "benchmarks"
@@ -41,12 +43,18 @@ settings.register_profile(
 settings.load_profile("hexacell")
 
 
+def pytest_report_header() -> str:
+    return f"long tests: those of turn {turn()} ({TURN}=0 to {TURNS - 1})"
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Whatever lies in tests/benchmarks is a benchmark; tests of the whole project come first.
 
     They are the longest, and the processes that share the tests should end together. Of tests with a
-    ``sample`` of their parameters the others are slow.
+    ``sample`` of their parameters the others are slow, and so are long tests whose turn it is not.
     """
+    for item in whose_turn_it_is_not(items):
+        item.add_marker(pytest.mark.slow)
     patterns: set[tuple[str, str]] = set()
     taken: set[tuple[str, str]] = set()
     for item in items:
@@ -58,11 +66,20 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             patterns, taken = patterns | {(test, one) for one in sample.args}, taken | found
             if not found:
                 item.add_marker(pytest.mark.slow)
-    if patterns != taken and not any("::" in argument for argument in config.args):
+    if any("::" in argument for argument in config.args):
+        return
+    if patterns != taken:
         raise pytest.UsageError(
             f"these samples name no parameters of their tests: {sorted(patterns - taken)}"
         )
+    if gone := not_there(items):
+        raise pytest.UsageError(f"{LONG_TESTS.name} lists tests that are not there: {sorted(gone)}")
     items.sort(key=lambda item: item.path.parent != TESTS)
+
+
+# Nearly all that tests leave goes by its count of references: to look for circles after every 700 objects
+# takes a tenth of the time.
+gc.set_threshold(50_000)
 
 
 def pytest_collection_finish() -> None:
@@ -97,6 +114,7 @@ def nothing_left_open() -> Iterator[None]:
     while left := (_threads() | _descriptors() | _blocked_signals()) - before:
         if time.monotonic() > give_up:
             pytest.fail(f"left behind: {', '.join(sorted(left))}", pytrace=False)
+        gc.collect()
         time.sleep(0.01)
 
 

@@ -1,9 +1,11 @@
-"""The leak check of the test suite: a test that leaks resources fails, one that cleans up passes."""
+"""The test suite itself: a test that leaks resources fails alone, and long tests take turns."""
 
 from pathlib import Path
 from textwrap import dedent
 
 import pytest
+
+from tests.turns import TURN, TURNS
 
 HERE = Path(__file__).parent
 
@@ -53,7 +55,9 @@ HEADER = """
 def suite(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Pytester:
     """A project with this one's settings and conftest."""
     tests = pytester.mkdir("tests")
-    (tests / "conftest.py").write_text((HERE / "conftest.py").read_text())
+    for name in ("conftest.py", "turns.py"):
+        (tests / name).write_text((HERE / name).read_text())
+    (tests / "long_tests.txt").touch()
     (pytester.path / "pyproject.toml").write_text((HERE.parent / "pyproject.toml").read_text())
     monkeypatch.setenv("COLUMNS", "500")
     return pytester
@@ -74,3 +78,28 @@ def test_a_leak_fails_its_test_and_no_other(suite: pytest.Pytester) -> None:
     result = run(suite, *sources, THREADS_END)
     result.stdout.fnmatch_lines_random(list(LEAKS))
     result.assert_outcomes(passed=2 * len(LEAKS) + 1, errors=len(LEAKS))
+
+
+def test_each_case_of_a_long_test_has_its_turn_and_the_others_run_always(
+    suite: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = """
+        @pytest.mark.parametrize("case", range(12))
+        def test_long(case): pass
+
+        def test_short(): pass
+    """
+    (suite.path / "tests" / "test_inner.py").write_text(dedent(HEADER) + dedent(source))
+    (suite.path / "tests" / "long_tests.txt").write_text("tests/test_inner.py::test_long\n")
+    ran: list[str] = []
+    for number in range(TURNS):
+        monkeypatch.setenv(TURN, str(number))
+        result = suite.runpytest_subprocess("tests", "-m", "not slow", "-v")
+        ran += [line.split()[0].rpartition("::")[2] for line in result.outlines if "PASSED" in line]
+    assert sorted(ran) == sorted([f"test_long[{case}]" for case in range(12)] + TURNS * ["test_short"])
+
+
+def test_a_long_test_that_is_gone_is_not_left_in_the_list(suite: pytest.Pytester) -> None:
+    (suite.path / "tests" / "long_tests.txt").write_text("tests/test_inner.py::test_renamed\n")
+    result = run(suite, "def test_now(): pass")
+    result.stderr.fnmatch_lines(["*long_tests.txt lists tests that are not there: *test_renamed*"])

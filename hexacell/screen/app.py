@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 from collections.abc import Callable, Coroutine, Iterable
 from contextlib import suppress
 from functools import partial
@@ -14,11 +15,11 @@ from textual.binding import BindingType
 from textual.css.query import NoMatches
 from textual.screen import Screen
 
-from hexacell.errors import HexacellError
+from hexacell.errors import HexacellError, UsageError
 from hexacell.plugins import plugin_failures_named
 from hexacell.printable import printable
 from hexacell.screen import overlays, tabs
-from hexacell.screen.further_screens import AssistantScreen, DigitsScreen, PlanScreen
+from hexacell.screen.further_screens import AssistantScreen, CellFileScreen, DigitsScreen, PlanScreen
 from hexacell.screen.preferences import KEYS, ONCE, SCREEN_THEMES, THEMES, ScreenAction, ScreenPreferences
 from hexacell.screen.widgets import KeyLine
 from hexacell.text.screens.views import FaultView
@@ -27,7 +28,15 @@ if TYPE_CHECKING:
     from hexacell.screen.model import ScreenModel
     from hexacell.text.screens.first_questions import FirstCellAssistant
 
-DRAWN_EVERY_S = 0.1
+DRAWN_AFTER_S = 0.05
+"""What changes within so long is drawn together, s."""
+
+AGES_EVERY_S = 1.0
+"""How often everything is drawn though nothing has changed: ages of readings grow, s."""
+
+CALL = re.compile(r"(?:app\.)?perform\('([^']*)'(?:, '([^']*)')?\)")
+"""An action of the model, with what it is about."""
+
 MADE_EVERY_S = 0.04
 """Pause after each screen that is made behind the first one, s: for what else is to be done meanwhile."""
 
@@ -53,7 +62,7 @@ def _assistant(path: Path) -> FirstCellAssistant:
 
 
 class TechnicianApp(App[int]):
-    """Loads its model behind the first screen and draws what that knows ten times a second.
+    """Loads its model behind the first screen and draws what that knows whenever it changes.
 
     Attributes:
         model: what is shown; None while it loads.
@@ -77,7 +86,7 @@ class TechnicianApp(App[int]):
         self.keys_in_use = {str(one.id): one.key_display or one.key for one in KEYS} | self.preferences.keys
         self._load, self._first_cell = load, first_cell
         self.model: ScreenModel | None = None
-        self._question_seen, self._fault_seen, self._runs_seen = 0, 0, 0
+        self._question_seen, self._fault_seen, self._runs_seen, self._refusals_seen = 0, 0, 0, 0
         super().__init__()
         for theme in SCREEN_THEMES:
             self.register_theme(theme)
@@ -104,11 +113,20 @@ class TechnicianApp(App[int]):
             with plugin_failures_named():
                 self.model = await asyncio.to_thread(self._load)
             self.draw()
-            self.set_interval(DRAWN_EVERY_S, self.draw)
+            self.set_interval(AGES_EVERY_S, self.draw)
+            self.run_worker(self._draw_changes(self.model), exit_on_error=False, group="draw")
             self.run_worker(self._make_screens(), exit_on_error=False, group="make")
             await self.model.attend()
         except HexacellError as error:
             self._show_error(error)
+
+    async def _draw_changes(self, model: ScreenModel) -> None:
+        """Draw what has changed, all of it together that does so at about the same time."""
+        while True:
+            await model.changed.wait()
+            await asyncio.sleep(DRAWN_AFTER_S)
+            model.changed.clear()
+            self.draw()
 
     async def _make_screens(self) -> None:
         """Make the screens behind the first one before somebody wants them, one at a time."""
@@ -131,9 +149,15 @@ class TechnicianApp(App[int]):
         if self.model is None or not self.screen_stack:  # it is loading, or being closed
             return
         for screen in self.screen_stack:
-            if isinstance(screen, tabs.TabScreen | DigitsScreen | PlanScreen | overlays.QuestionOverlay):
-                with suppress(NoMatches):  # it is being composed, or taken away
+            with suppress(NoMatches):  # it is being composed, or taken away
+                if isinstance(screen, tabs.TabScreen):
+                    screen.draw(self.model, self.has_effect)
+                elif isinstance(screen, DigitsScreen | PlanScreen | overlays.QuestionOverlay):
                     screen.draw(self.model)
+        refusals, refused = self.model.refusal
+        if refusals > self._refusals_seen:
+            self.notify(printable(refused), severity="warning", markup=False)
+        self._refusals_seen = refusals
         if self.model.run.runs != self._runs_seen:  # a new run is shown; overlays come after that
             self._runs_seen = self.model.run.runs
             self.action_show("measure")
@@ -174,19 +198,27 @@ class TechnicianApp(App[int]):
                 said = await work
             if said:
                 self.notify(printable(said), markup=False)
+        except UsageError as error:
+            self.notify(printable(str(error)), severity="warning", markup=False)
         except HexacellError as error:
             self._show_error(error)
+        finally:
+            self.draw()
 
     def _show_error(self, error: HexacellError) -> None:
         self.push_screen(
             overlays.FaultOverlay(FaultView("That did not work", error.cause, error.action or ""))
         )
 
-    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Whether a key has an effect now."""
-        if action != "perform" or not parameters or self.model is None:
-            return True
-        return True if self.model.allows(ScreenAction(str(parameters[0]))) else None
+    def has_effect(self, action: str) -> bool:
+        """Whether a key that does this has an effect now."""
+        if self.model is None:
+            return CALL.match(action) is None
+        if asked := CALL.match(action):
+            return self.model.allows(ScreenAction(asked[1]), asked[2] or "")
+        if action == "answer":
+            return self.model.question() is not None or bool(self.model.proposing_run)
+        return True
 
     def action_show(self, tab: str) -> None:
         """Go to another screen."""
@@ -200,7 +232,8 @@ class TechnicianApp(App[int]):
 
     async def _confirmed(self, model: ScreenModel, action: ScreenAction, argument: str) -> str:
         """Do something, once a person has confirmed it where that is needed."""
-        question = await model.confirmation(action, argument) if model.allows(action) else None
+        may = model.allows(action, argument)
+        question = await model.confirmation(action, argument) if may else None
         if question is not None:
             consent = await self.push_screen_wait(overlays.ConfirmOverlay(question))
             if consent is None:
@@ -217,6 +250,11 @@ class TechnicianApp(App[int]):
     def action_digits(self) -> None:
         """Show the gauges in large figures."""
         self.push_screen(DigitsScreen())
+
+    def action_cell_file(self) -> None:
+        """Show the whole cell file."""
+        if self.model is not None:
+            self.push_screen(CellFileScreen(*self.model.described))
 
     def action_plan(self) -> None:
         """Show the poses of the plan; it is tried first where it was not yet."""

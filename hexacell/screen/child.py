@@ -15,7 +15,7 @@ from hexacell.python_process import python_command
 from hexacell.services.offline import try_plan
 from hexacell.services.run.calibration_run import preflight
 from hexacell.text.planning import device_line, plan_trial_lines
-from hexacell.text.screens.live import checked_items, failed_items
+from hexacell.text.screens.checklist import checked_items, failed_items
 from hexacell.text.screens.views import ChecklistItem, Mark
 from procedures.calibration.calibration import Mode
 

@@ -1,8 +1,9 @@
-"""Screens beside the five: gauges in large figures, the planned poses, and the first-time assistant."""
+"""Screens beside the five: large figures, the cell file, the planned poses, the first-time assistant."""
 
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
@@ -12,7 +13,7 @@ from textual.containers import Vertical
 from textual.screen import Screen
 from textual.widgets import Digits, Input
 
-from hexacell.screen.widgets import RowList, TextPanel, show_parts
+from hexacell.screen.widgets import BannerBar, RowList, TextList, TextPanel, set_urgency, show_parts, titled
 from hexacell.text.screens.views import Urgency
 
 if TYPE_CHECKING:
@@ -28,29 +29,53 @@ WHAT_TO_PRESS = (
 
 
 class DigitsScreen(Screen[None]):
-    """Deviation of each gauge where there is a zero, else its reading."""
+    """Deviation of each gauge where there is a zero, else its reading, to be read across the room."""
 
     BINDINGS: ClassVar[list[BindingType]] = [("d,escape,enter", "dismiss", "Back")]
     _records = -1
 
     def compose(self) -> ComposeResult:
-        """What happens now, and three figures."""
-        yield TextPanel(id="digits-now")
+        """The banner, and a figure and a bar for each gauge."""
+        yield BannerBar()
         for number in range(GAUGES):
-            yield Digits(id=f"digits-{number}", classes="digits")
+            with titled(Vertical(id=f"gauge-{number}"), ""):
+                yield Digits(classes="digits")
+                yield TextPanel(classes="digits-bar")
         yield TextPanel("mm, deviation from the reference where there is one. d or Escape goes back.")
 
     def draw(self, model: ScreenModel) -> None:
         """Show the gauges."""
-        now, figures, records = model.figures()
-        self.query_one("#digits-now", TextPanel).show(now)
-        for number, (figure, urgency) in enumerate(figures[:GAUGES]):
-            digits = self.query_one(f"#digits-{number}", Digits)
-            digits.update(figure)
-            digits.set_class(urgency is Urgency.ALARM, "urgency-alarm")
+        self.query_one(BannerBar).show(model.banner("measure"))
+        figures, records = model.figures()
+        for number, (axis, figure, bar, urgency) in enumerate(figures[:GAUGES]):
+            row = self.query_one(f"#gauge-{number}")
+            row.border_title = f"gauge {axis}"
+            set_urgency(row, urgency)
+            row.query_one(Digits).update(figure)
+            row.query_one(TextPanel).show(bar)
         if self._records not in {-1, records}:
             self.app.bell()
         self._records = records
+
+
+class CellFileScreen(Screen[None]):
+    """The whole cell file, with the line of each value or that it is a default."""
+
+    AUTO_FOCUS = "#file"
+    BINDINGS: ClassVar[list[BindingType]] = [("f,escape,enter", "dismiss", "Back")]
+
+    def __init__(self, title: str, lines: Sequence[str]) -> None:
+        super().__init__()
+        self._title, self._lines = title, lines
+
+    def compose(self) -> ComposeResult:
+        """The text."""
+        yield titled(TextList(id="file"), self._title)
+        yield TextPanel("The arrows scroll, f or Escape goes back.", classes="hint")
+
+    def on_mount(self) -> None:
+        """Show the text."""
+        self.query_one(TextList).show(self._lines)
 
 
 class PlanScreen(Screen[None]):
@@ -65,9 +90,8 @@ class PlanScreen(Screen[None]):
 
     def compose(self) -> ComposeResult:
         """The parts of this screen."""
-        yield TextPanel("The poses of the plan", classes="title")
         yield TextPanel(id="plan-note", classes="instruction")
-        yield RowList(id="poses")
+        yield titled(RowList(id="poses"), "The poses of the plan")
         yield TextPanel(WHAT_TO_PRESS, id="plan-hint", classes="hint")
 
     def draw(self, model: ScreenModel) -> None:
@@ -100,10 +124,9 @@ class AssistantScreen(Screen[bool]):
     def compose(self) -> ComposeResult:
         """One question, a field, and what is wrong with the answer."""
         yield TextPanel(
-            f"hexacell | There is no {self._path.name} yet. Some questions lead to it.", id="where"
+            f"hexacell │ There is no {self._path.name} yet. Some questions lead to it.", id="where"
         )
-        with Vertical(id="assistant"):
-            yield TextPanel(id="progress", classes="title")
+        with titled(Vertical(id="assistant"), ""):
             yield TextPanel(id="first-question")
             yield TextPanel(id="first-hint", classes="hint")
             yield Input(id="first-answer", compact=True)
@@ -134,7 +157,7 @@ class AssistantScreen(Screen[bool]):
     def _show(self) -> None:
         assistant, field = self._assistant, self.query_one(Input)
         text, hint = assistant.question
-        self.query_one("#progress", TextPanel).show(assistant.progress)
+        self.query_one("#assistant").border_title = assistant.progress
         self.query_one("#first-question", TextPanel).show(text)
         self.query_one("#first-hint", TextPanel).show(hint)
         self.query_one("#first-problem", TextPanel).show(assistant.problem, Urgency.ALARM)

@@ -6,24 +6,32 @@ from collections.abc import Awaitable, Callable
 from operator import is_
 from typing import Any
 
-from hexacell.cell.loader import Cell, describe
+from hexacell.cell.loader import describe
 from hexacell.config.versions import ConfigEditedSince
 from hexacell.errors import HexacellError, UsageError
 from hexacell.run_process.messages import LiveSnapshot
 from hexacell.run_process.recorded import RecordedRun
 from hexacell.screen.child import TriedPlan
-from hexacell.screen.preferences import ONCE, ScreenAction
+from hexacell.screen.preferences import ONCE, RESUME, WITH_LENGTH, ScreenAction
 from hexacell.screen.watching import DeviceWatcher, RunFollower
 from hexacell.screen.workplace import Workplace
 from hexacell.services.history.run_index import PastRun
 from hexacell.text.config_changes import RELOAD, versions_text
-from hexacell.text.history import NO_RUNS, history_head, history_line
-from hexacell.text.screens import live, reviewing
-from hexacell.text.screens.live import plan_lines, plan_note, plan_rows
-from hexacell.text.screens.measuring import accuracy_plot, fault_view, guidance, record_lines
-from hexacell.text.screens.questions import PERSON, question_view
-from hexacell.text.screens.run_picture import header_line
-from hexacell.text.screens.views import ChecklistItem, FaultView, Line, Mark, QuestionView, Urgency
+from hexacell.text.screens import banner, devices, past_runs, reviewing
+from hexacell.text.screens.cell_facts import cell_facts
+from hexacell.text.screens.checklist import (
+    checked_items,
+    live_items,
+    plan_lines,
+    plan_note,
+    plan_rows,
+    summary,
+)
+from hexacell.text.screens.measuring import accuracy_plot, fault_view, progress, record_rows
+from hexacell.text.screens.placing import WIDE_BAR, Placing, placing
+from hexacell.text.screens.questions import ABORTING, PERSON, question_view
+from hexacell.text.screens.run_picture import header_line, refusal_text
+from hexacell.text.screens.views import Banner, ChecklistItem, FaultView, Line, Mark, QuestionView, Urgency
 from procedures.calibration.calibration import Mode
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Abort, Answer, MeasureAgain, Pause, Resume, Undo
@@ -41,21 +49,23 @@ class ScreenModel:
 
     Attributes:
         run: the run that is followed, live or recorded.
+        changed: set whenever there may be something else to show.
         runs: the runs of the cell, the latest first; None until they are read.
     """
 
     def __init__(self, workplace: Workplace, now: Callable[[], float] = time.monotonic) -> None:
         self._workplace, self._now = workplace, now
-        self.run = RunFollower(now, self._after_run)
-        self._devices = DeviceWatcher(workplace.watch, now)
+        self.changed = asyncio.Event()
+        self.run = RunFollower(now, self._after_run, self.changed.set)
+        self._devices = DeviceWatcher(workplace.watch, now, self.changed.set)
         self._run_is_over = asyncio.Event()
         self._is_checking, self._is_starting, self._is_ready = False, False, False
+        self._is_unfolded = False
         self._checked: tuple[ChecklistItem, ...] | None = None
         self.runs: tuple[PastRun, ...] | None = None
         self._compared: tuple[str, ...] = ()
         self._tried: TriedPlan | None = None
         self._trial: asyncio.Future[TriedPlan] | None = None
-        self._described: tuple[Cell | None, tuple[str, ...]] = (None, ())
         self._reviewed: tuple[tuple[object, ...], dict[str, tuple[Any, ...]]] | None = None
 
     async def attend(self) -> None:
@@ -112,9 +122,26 @@ class ScreenModel:
         """Whether a run goes on that has the devices."""
         return self.run.connection is not None and self._recording is None
 
-    def header(self) -> tuple[str, str, Urgency]:
-        """The first line of every screen."""
+    def header(self) -> tuple[str, str]:
+        """The first line of every screen: what is done where, and who is in control."""
         return header_line(self._workplace.cell.settings.name, self.run.picture)
+
+    def banner(self, screen: str) -> Banner:
+        """The banner of a screen: that of the run while one goes on, else what this screen is for."""
+        if self._is_starting:
+            return banner.STARTING
+        is_of_run = self._is_running or screen in {"measure", "review"}
+        if is_of_run and screen != "preflight":
+            return banner.run_banner(self.run.picture, self._workplace.cell.settings)
+        match screen:
+            case "cell":
+                return banner.cell_banner(self._devices.live, self._devices.problem)
+            case "preflight":
+                return banner.preflight_banner(
+                    self._checked, is_checking=self._is_checking, is_running=self._is_running
+                )
+            case _:
+                return banner.history_banner(None if self.runs is None else len(self.runs))
 
     def shown(self, screen: str) -> dict[str, tuple[Any, ...]]:
         """What the parts of a screen show now, by their names: what each ``show`` is called with."""
@@ -122,47 +149,45 @@ class ScreenModel:
         tried, is_trying = self._tried or TriedPlan(), self._trial is not None
         match screen:
             case "cell":
-                if self._described[0] is not cell:
-                    self._described = (cell, tuple(describe(cell).splitlines()))
-                title = f"What {cell.path.name} says; behind each value its line in the file, or default"
-                settings = (*self._workplace.warnings, *self._described[1])
-                return {
-                    "devices": (self._devices_now(),),
-                    "settings-title": (title,),
-                    "settings": (settings,),
-                }
+                warnings = [(one, Urgency.ATTENTION) for one in self._workplace.warnings]
+                facts = ([*warnings, *((one, Urgency.CALM) for one in cell_facts(cell))],)
+                return {"cards": (devices.device_cards(*self._live()),), "facts": facts}
             case "preflight":
                 if (checked := self._checked) is None:
-                    checked = live.checked_items(Mark.BUSY if self._is_checking else Mark.OPEN)
-                items = (*live.live_items(self._live()[0]), *checked)
+                    checked = checked_items(Mark.BUSY if self._is_checking else Mark.OPEN)
+                items = (*live_items(self._live()[0], is_checking=self._is_checking), *checked)
+                lines = [(summary(items), Urgency.CALM)]
+                lines += [line for item in items for line in item.lines(is_unfolded=self._is_unfolded)]
                 return {
-                    "instruction": (self._instruction(),),
-                    "checklist": ([line for item in items for line in item.lines],),
+                    "checklist": (lines,),
                     "plan": (plan_lines(cell.settings, tried.lines, is_trying=is_trying),),
                 }
             case "plan":
                 note = plan_note(tried.poses, is_trying=is_trying)
                 return {"plan-note": (note,), "poses": ([*plan_rows(cell.settings, tried.poses)],)}
             case "measure":
+                limit = cell.settings.identification.target_mm or cell.settings.acceptance.position_mm
                 return {
-                    "guidance": (guidance(picture, cell.settings),),
-                    "devices": (live.device_lines(*self._measured()),),
-                    "records": (record_lines(picture),),
-                    "accuracy": (accuracy_plot(picture, cell.settings.identification.target_mm),),
+                    "progress": (progress(picture, cell.settings),),
+                    "gauges": (self.gauges(),),
+                    "records": (record_rows(picture),),
+                    "accuracy": (accuracy_plot(picture, limit),),
                 }
             case "review":
                 return self._result()
             case _:  # the history
-                title = history_head() if self.runs else reviewing.READING if self.runs is None else NO_RUNS
-                asked = () if self.runs is None else (*reviewing.WHAT_TO_PRESS, "", *self._compared)
-                rows = [(run.name, history_line(run)) for run in self.runs or ()]
-                return {"history-header": (title,), "comparison": (asked,), "runs": (rows,)}
+                return {
+                    "runs": (past_runs.run_rows(self.runs or ()),),
+                    "trend": (past_runs.trend_plot(self.runs or ()),),
+                    "comparison": (self._compared or past_runs.NOTHING_ASKED,),
+                }
 
-    def _devices_now(self) -> list[Line]:
-        snapshot, later_s = self._live()
-        if self._devices.problem and snapshot is None:
-            return [(self._devices.problem, Urgency.CALM)]
-        return live.device_lines(snapshot, later_s)
+    @property
+    def described(self) -> tuple[str, tuple[str, ...]]:
+        """The whole cell file: what it is, and its lines."""
+        cell = self._workplace.cell
+        title = f"{cell.path.name}: behind each value its line in the file, or default"
+        return title, tuple(describe(cell).splitlines())
 
     def _live(self) -> tuple[LiveSnapshot | None, float]:
         """What the devices showed last, and how long ago, s."""
@@ -182,39 +207,46 @@ class ScreenModel:
         zero = None if picture.at is None else picture.state.zero_shown(picture.at)
         return picture.live, self._now() - picture.live_at_s, zero
 
-    def _instruction(self) -> str:
-        """What to press before a run, or why none can be started now."""
-        if self._is_checking:
-            return live.CHECKING
-        if self._is_running or self._is_starting:
-            return live.RUNNING if self._is_running else live.STARTING
-        has_fixture = self._workplace.cell.settings.length_check is not None
-        return f"{live.PRESS_CHECK} {live.PRESS_LENGTH}" if has_fixture else live.PRESS_CHECK
+    def gauges(self) -> list[Line]:
+        """A line for each gauge, and one for the other devices."""
+        return devices.gauge_lines(*self._measured())
 
-    def mounting(self) -> list[Line]:
-        """How each gauge is to be moved while the gauges are placed."""
-        return live.device_lines(*self._measured(), self._workplace.cell.settings.stations.mounting_mm)
+    def placing(self) -> Placing:
+        """How the gauges stand while they are placed."""
+        return placing(self._measured()[0], self._workplace.cell.settings.stations.mounting_mm)
 
-    def figures(self) -> tuple[str, list[Line], int]:
-        """What happens now, the figure of each gauge, and the number of records."""
+    def figures(self) -> tuple[list[tuple[str, str, str, Urgency]], int]:
+        """Axis, figure, bar and urgency of each gauge, and the number of records."""
         snapshot, _, zero = self._measured()
-        gauges = () if snapshot is None else snapshot.gauges
-        figures = [(live.gauge_figure(one, zero), live.urgency_of(one.problem)) for one in gauges]
-        records = sum(len(measured.samples) for measured in self.run.picture.state.sets.values())
-        return guidance(self.run.picture, self._workplace.cell.settings)["Now"], figures, records
+        shown: list[tuple[str, str, str, Urgency]] = [
+            (
+                one.axis,
+                devices.gauge_figure(one, zero),
+                devices.travel_bar(devices.plunger_place(one), one.travel_mm / 2.0, WIDE_BAR),
+                devices.urgency_of(one.problem),
+            )
+            for one in (() if snapshot is None else snapshot.gauges)
+        ]
+        return shown, sum(len(measured.samples) for measured in self.run.picture.state.sets.values())
 
     def _result(self) -> dict[str, tuple[Any, ...]]:
         """The parts of the result; made again where something has changed beside the live values."""
         picture, may_write = self.run.picture, bool(self.proposing_run)
         seen = (picture.state, picture.question, may_write)
         if self._reviewed is None or not all(map(is_, self._reviewed[0], seen)):
-            texts = reviewing.review_texts(picture, self._workplace.cell.settings, may_write=may_write)
-            shown: dict[str, tuple[Any, ...]] = {name: (text,) for name, text in texts.items()}
-            urgency = reviewing.URGENCIES.get(picture.state.verdict, Urgency.ATTENTION)
-            shown["verdict"] = (texts["verdict"], urgency)
-            shown["plot-0"] = (reviewing.deviation_plot(picture.state),)
-            shown["plot-1"] = (reviewing.residual_plot(picture),)
-            shown["plot-2"] = (accuracy_plot(picture, None),)
+            settings, state = self._workplace.cell.settings, picture.state
+            verdict, consequences, scope = reviewing.review_lines(picture, may_write=may_write)
+            shown: dict[str, tuple[Any, ...]] = {
+                "verdict": verdict,
+                "consequences": (consequences,),
+                "scope": (scope,),
+                "frames": (reviewing.frames_note(state),),
+                "parameters": (reviewing.parameter_cells(state, settings),),
+                "change": (reviewing.change_text(picture),),
+                "plot-deviation": (reviewing.deviation_plot(state),),
+                "plot-residual": (reviewing.residual_plot(picture),),
+                "plot-accuracy": (accuracy_plot(picture, settings.acceptance.position_mm),),
+            }
             self._reviewed = (seen, shown)
         return self._reviewed[1]
 
@@ -232,7 +264,13 @@ class ScreenModel:
 
     # Actions.
 
-    def allows(self, action: ScreenAction) -> bool:
+    @property
+    def refusal(self) -> tuple[int, str]:
+        """How many commands of the run were refused, and why the last one was."""
+        picture = self.run.picture
+        return picture.refusals, "" if picture.refusal is None else refusal_text(picture.refusal)
+
+    def allows(self, action: ScreenAction, argument: str = "") -> bool:
         """Whether an action has an effect now."""
         asked = ScreenAction
         match action:
@@ -243,16 +281,26 @@ class ScreenModel:
                 return self._recording is not None
             case asked.TAKE_CONTROL:
                 return self._is_running and not self.run.picture.may_command
+            case asked.START if not self._may_start(argument):
+                return False
             case asked.CHECK | asked.START | asked.EXCLUDE | asked.ROLL_BACK | asked.APPLY:
                 return not (self._is_running or self._is_checking or self._is_starting)
             case _:
                 return True
 
+    def _may_start(self, what: str) -> bool:
+        """Whether there is what a run needs: a fixture for its length check, or a run to resume."""
+        if what in {Mode.LENGTH, WITH_LENGTH}:
+            return self._workplace.cell.settings.length_check is not None
+        if what == RESUME:
+            return any(one.summary.has_begun and not one.summary.is_over for one in self.runs or ())
+        return True
+
     async def perform(  # noqa: C901, PLR0912 - a case an action
         self, action: ScreenAction, argument: str = ""
     ) -> str:
         """Do what was asked for; a remark about it, or an empty text."""
-        if not self.allows(action):
+        if not self.allows(action, argument):
             raise UsageError(f"{action} has no effect now")
         workplace, connection, at = self._workplace, self.run.connection, self.run.picture.at
         match action:
@@ -266,7 +314,7 @@ class ScreenModel:
             case ScreenAction.MEASURE_AGAIN if at is not None:
                 await self.run.give(MeasureAgain(at))
             case ScreenAction.MEASURE_AGAIN:
-                raise UsageError("no point is being measured now")
+                raise UsageError("No point is being measured now")
             case ScreenAction.ABORT:
                 await self.run.give(Abort())
             case ScreenAction.TAKE_CONTROL if connection is not None:
@@ -290,6 +338,8 @@ class ScreenModel:
                 return await self._change_config(workplace.apply, argument)
             case ScreenAction.OPEN:
                 await self.run.follow(await workplace.open_run(argument))
+            case ScreenAction.UNFOLD:
+                self._is_unfolded = not self._is_unfolded
             case ScreenAction.STEP | ScreenAction.PLAY if (recording := self._recording) is not None:
                 self._wind(recording, action, argument)
         return ""
@@ -299,6 +349,8 @@ class ScreenModel:
         match action:
             case ScreenAction.APPLY:
                 return question_view(await self._workplace.approval(argument), None)
+            case ScreenAction.ABORT:
+                return ABORTING
             case ScreenAction.ROLL_BACK:
                 is_there = await self._workplace.is_in_controller(argument)
                 return reviewing.rollback_question(argument, is_in_controller=is_there)

@@ -8,20 +8,46 @@ from typing import TYPE_CHECKING, ClassVar
 
 from textual.app import ComposeResult
 from textual.binding import BindingType
-from textual.containers import Vertical, VerticalScroll
+from textual.containers import Horizontal, Vertical, VerticalScroll
+from textual.content import Content
 from textual.events import Key
 from textual.screen import ModalScreen, ScreenResultType
-from textual.widgets import Input
+from textual.widgets import Input, Static
 
 from hexacell.screen.preferences import KEYS, preferences_path, shown_path
-from hexacell.screen.widgets import DevicePanel, TextList, TextPanel
+from hexacell.screen.widgets import LinePanel, TextList, TextPanel, coloured
+from hexacell.text.screens import help as texts
 from hexacell.text.screens import views
 
 if TYPE_CHECKING:
     from hexacell.screen.model import ScreenModel
+    from hexacell.text.screens.placing import Placing
 
 LONGEST_TYPED = 200
 """What is pasted by mistake may be a whole file."""
+
+
+class PlacingPanel(Horizontal):
+    """Ball and gauges as mounted, and beside them where each plunger stands in its travel."""
+
+    are_in_place = False
+
+    def __init__(self) -> None:
+        self._picture, self._gauges = Static(id="placing-picture"), LinePanel(id="placing-gauges")
+        super().__init__(self._picture, self._gauges, id="placing")
+        self._shown: Placing | None = None
+
+    def show(self, placing: Placing) -> None:
+        """Show how they stand; the bell rings once all of them are in place."""
+        if placing == self._shown:
+            return
+        if placing.are_in_place and self._shown is not None and not self._shown.are_in_place:
+            self.app.bell()
+        self._shown = placing
+        rows = [Content("").join(coloured(*piece) for piece in row) for row in placing.picture]
+        self._picture.update(Content("\n").join(rows))
+        lines = [line for pair in placing.gauges for line in (*pair, ("", views.Urgency.CALM))]
+        self._gauges.show(lines)
 
 
 class AnswerOverlay(ModalScreen[ScreenResultType]):
@@ -43,12 +69,16 @@ class AnswerOverlay(ModalScreen[ScreenResultType]):
     def compose(self) -> ComposeResult:
         """The question, the gauges where they matter, and what to press."""
         view = self.view
-        with Vertical(id="question", classes=f"overlay overlay-{view.urgency}"):
+        with Vertical(id="question", classes=f"overlay overlay-{view.urgency} beside-{view.beside}"):
             yield TextPanel(view.title, classes="overlay-title")
+            first, *more = (*view.paragraphs, view.change)
             with VerticalScroll(id="question-text"):
-                yield TextPanel("\n\n".join(filter(None, (*view.paragraphs, view.change))))
-            if view.shows_gauges:
-                yield DevicePanel(id="mounting")
+                yield TextPanel(first)
+                yield TextPanel("\n".join(["", "\n\n".join(filter(None, more))]), classes="more")
+            if view.beside is views.Beside.PLACING:
+                yield PlacingPanel()
+            elif view.beside is views.Beside.GAUGES:
+                yield LinePanel(id="mounting")
             if view.refusal:
                 yield TextPanel(view.refusal, id="refusal")
             yield TextPanel(view.instruction, id="instruction")
@@ -132,8 +162,10 @@ class QuestionOverlay(AnswerOverlay[None]):
 
     def draw(self, model: ScreenModel) -> None:
         """Show the gauges as they are now."""
-        if self.view.shows_gauges:
-            self.query_one(DevicePanel).show(model.mounting())
+        if self.view.beside is views.Beside.PLACING:
+            self.query_one(PlacingPanel).show(model.placing())
+        elif self.view.beside is views.Beside.GAUGES:
+            self.query_one("#mounting", LinePanel).show(model.gauges())
 
 
 class FaultOverlay(ModalScreen[None]):
@@ -179,7 +211,7 @@ class HelpOverlay(ModalScreen[None]):
     def on_mount(self) -> None:
         """Show the texts."""
         keys = [f"  {self._keys[str(one.id)]:8} {one.description}" for one in KEYS]
-        note = views.KEYS_NOTE.format(path=shown_path(preferences_path()))
-        about = [*views.SCREEN_HELP[self._tab].splitlines(), ""]
-        replay = ["", *views.REPLAY_HELP.splitlines()]
-        self.query_one(TextList).show([*about, f"{views.KEYS_TITLE}:", *keys, "", note, *replay])
+        note = texts.KEYS_NOTE.format(path=shown_path(preferences_path()))
+        about = [*texts.SCREEN_HELP[self._tab].splitlines(), ""]
+        replay = ["", *texts.REPLAY_HELP.splitlines()]
+        self.query_one(TextList).show([*about, f"{texts.KEYS_TITLE}:", *keys, "", note, *replay])

@@ -56,6 +56,7 @@ class ScreenAction(StrEnum):
     DRIFT = "drift"
     STEP = "step"
     PLAY = "play"
+    UNFOLD = "unfold"
 
 
 KEYS = (
@@ -65,13 +66,13 @@ KEYS = (
     Binding("4", "show('review')", "Review", id="review", show=False),
     Binding("5", "show('history')", "History", id="history", show=False),
     Binding("p", "perform('pause')", "Pause", id="pause"),
-    Binding("P", "perform('pause at once')", "Pause at once", id="pause-at-once", show=False),
+    Binding("P", "perform('pause at once')", "Pause at once", id="pause-at-once"),
     Binding("u", "perform('undo')", "Undo", id="undo"),
     Binding("m", "perform('measure again')", "Again", id="measure-again"),
-    Binding("a", "perform('abort')", "Abort", id="abort"),
+    Binding("a", "perform('abort')", "End run", id="abort"),
+    Binding("w", "answer", "Answer", id="answer"),
+    Binding("c", "perform('take control')", "Take control", id="take-control"),
     Binding("d", "digits", "Digits", id="digits"),
-    Binding("w", "answer", "Answer the question", id="answer", show=False),
-    Binding("c", "perform('take control')", "Take control", id="take-control", show=False),
     Binding("t", "next_theme", "Light, dark, monochrome", id="theme", show=False),
     Binding("question_mark", "help", "Help", key_display="?", id="help"),
     Binding("q", "leave", "Quit", id="quit"),

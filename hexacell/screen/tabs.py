@@ -1,9 +1,9 @@
-"""The five screens: cell, preflight, measure, review, history; each draws views of the model."""
+"""The five screens: cell, preflight, measure, review, history; each shows views of the model."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, ClassVar
 
 from textual.app import ComposeResult
@@ -12,14 +12,16 @@ from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.screen import Screen
 
 from hexacell.screen import widgets
+from hexacell.screen.plot_panel import PlotPanel
 from hexacell.screen.preferences import WITH_LENGTH
+from hexacell.screen.widgets import titled
 
 if TYPE_CHECKING:
     from hexacell.screen.model import ScreenModel
 
 
 class TabScreen(Screen[None]):
-    """One of the five screens; drawn ten times a second while it is in front."""
+    """One of the five screens."""
 
     TAB: ClassVar[str]
 
@@ -28,75 +30,70 @@ class TabScreen(Screen[None]):
         self._keys = keys
 
     def compose(self) -> ComposeResult:
-        """The first lines, what is its own, and the footer."""
+        """The first lines, the banner, what is its own, and the keys."""
         yield widgets.TopLine()
         yield widgets.TabLine(self.TAB, self._keys)
+        yield widgets.BannerBar()
         yield from self._parts()
-        yield widgets.KeyLine(self._keys)
+        yield widgets.KeyLine()
 
     @abstractmethod
     def _parts(self) -> ComposeResult: ...
 
-    def draw(self, model: ScreenModel) -> None:
+    def draw(self, model: ScreenModel, has_effect: Callable[[str], bool]) -> None:
         """Show what is so now."""
         self.query_one(widgets.TopLine).show(*model.header())
+        self.query_one(widgets.BannerBar).show(model.banner(self.TAB))
         widgets.show_parts(self, model, self.TAB)
-        self.query_one(widgets.KeyLine).show(model.allows)
+        self.query_one(widgets.KeyLine).show(has_effect)
 
 
 class CellScreen(TabScreen):
-    """Devices above, the file below."""
+    """A card for each device, and what the cell file states in a few lines."""
 
     TAB = "cell"
-    AUTO_FOCUS = "#settings"
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("f", "app.cell_file", "Cell file")]
 
     def _parts(self) -> ComposeResult:
-        yield widgets.TextPanel("Devices, as they show now", classes="title")
-        yield widgets.DevicePanel(id="devices")
-        yield widgets.TextPanel("Cell file", id="settings-title", classes="title")
-        yield widgets.TextList(id="settings")
+        yield widgets.CardGrid(id="cards")
+        yield titled(widgets.TextList(id="facts"), "Cell")
 
 
 class PreflightScreen(TabScreen):
-    """The checklist above, the plan below."""
+    """The checklist beside the plan."""
 
     TAB = "preflight"
     AUTO_FOCUS = "#checklist"
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("enter", "app.perform('check')", "Look at everything", show=False),
-        Binding("v", "app.perform('preview')", "Try the plan", show=False),
-        Binding("x", "app.plan", "Planned poses, and exclusions", show=False),
-        Binding("s", "app.perform('start', 'optimise')", "Start a calibration", show=False),
-        Binding("k", "app.perform('start', 'check')", "Start a check", show=False),
-        Binding("K", "app.perform('start', 'quick')", "Start a quick level", show=False),
-        Binding("l", "app.perform('start', 'length')", "Start a length check", show=False),
-        Binding("L", f"app.perform('start', '{WITH_LENGTH}')", "Calibrate, check the length", show=False),
-        Binding("r", "app.perform('start', 'resume')", "Resume the latest run", show=False),
+        Binding("enter", "app.perform('check')", "Look at all", key_display="Enter"),
+        Binding("s", "app.perform('start', 'optimise')", "Calibrate"),
+        Binding("k", "app.perform('start', 'check')", "Check"),
+        Binding("K", "app.perform('start', 'quick')", "Quick"),
+        Binding("r", "app.perform('start', 'resume')", "Resume"),
+        Binding("l", "app.perform('start', 'length')", "Length"),
+        Binding("L", f"app.perform('start', '{WITH_LENGTH}')", "Calibrate, length"),
+        Binding("v", "app.perform('preview')", "Plan"),
+        Binding("x", "app.plan", "Poses"),
+        Binding("i", "app.perform('unfold')", "Identities"),
     ]
 
     def _parts(self) -> ComposeResult:
-        yield widgets.TextPanel(id="instruction", classes="instruction")
-        yield widgets.TextPanel("What must hold before the robot moves", classes="title")
-        yield widgets.TextList(id="checklist")
-        yield widgets.TextPanel("The plan", classes="title")
-        yield widgets.TextList(id="plan")
-
-
-RECORDS_HEADER = f"{'point/pose':12}{'x':>8}{'y':>8}{'z':>8}{'residual':>9}{'sigma':>6}"
-"""The residual is the largest of x, y and z; sigma its ratio to noise."""
+        with Horizontal(id="sides"):
+            yield titled(widgets.TextList(id="checklist"), "What must hold before the robot moves")
+            yield titled(widgets.TextList(id="plan"), "The plan")
 
 
 class MeasureScreen(TabScreen):
-    """Guidance above, the devices, and below the records beside the predicted accuracy."""
+    """Progress and gauges above, and below the records beside the predicted accuracy."""
 
     TAB = "measure"
     AUTO_FOCUS = "#records"
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("space", "app.perform('play')", "Play or halt", show=False, priority=True),
+        Binding("space", "app.perform('play')", "Play or halt", priority=True),
+        Binding("right", "app.perform('step', '1')", "On", priority=True),
+        Binding("left", "app.perform('step', '-1')", "Back", priority=True),
         Binding("plus", "app.perform('play', '+')", "Faster", show=False),
         Binding("minus", "app.perform('play', '-')", "Slower", show=False),
-        Binding("right", "app.perform('step', '1')", "One event on", show=False, priority=True),
-        Binding("left", "app.perform('step', '-1')", "One event back", show=False, priority=True),
         Binding("pagedown", "app.perform('step', '100')", "A hundred on", show=False, priority=True),
         Binding("pageup", "app.perform('step', '-100')", "A hundred back", show=False, priority=True),
         Binding("home", "app.perform('step', 'first')", "To the beginning", show=False, priority=True),
@@ -104,74 +101,70 @@ class MeasureScreen(TabScreen):
     ]
 
     def _parts(self) -> ComposeResult:
-        yield widgets.GuidancePanel(id="guidance")
-        yield widgets.TextPanel("Devices", id="devices-title", classes="title")
-        yield widgets.DevicePanel(id="devices")
+        from hexacell.text.screens.measuring import RECORD_COLUMNS  # noqa: PLC0415 - after the first screen
+
+        with Vertical(id="upper"):
+            yield titled(widgets.ProgressPanel(id="progress"), "Progress")
+            yield titled(widgets.LinePanel(id="gauges"), "Gauges, deviation from the reference")
         with Horizontal(id="lower"):
-            with Vertical(id="record-side"):
-                yield widgets.TextPanel(
-                    "Records: deviation and residual, mm", id="records-title", classes="title"
-                )
-                yield widgets.TextPanel(RECORDS_HEADER, id="records-header", classes="table-header")
-                yield widgets.TextList(id="records", follows=True)
-            yield widgets.PlotPanel(id="accuracy")
-
-
-PLOTS = 3
+            yield titled(widgets.Table(RECORD_COLUMNS, id="records", is_read=True), "Records")
+            yield PlotPanel(id="accuracy")
 
 
 class ReviewScreen(TabScreen):
-    """The verdict stays in sight; the rest scrolls below it."""
+    """Verdict and consequences stay in sight; the rest scrolls below them."""
 
     TAB = "review"
     AUTO_FOCUS = "#details"
 
     def _parts(self) -> ComposeResult:
-        yield widgets.TextPanel(id="verdict")
-        yield widgets.TextPanel(id="scope")
-        yield widgets.TextPanel(id="approval")
+        from hexacell.text.screens.reviewing import PARAMETER_COLUMNS  # noqa: PLC0415 - see above
+
+        with Vertical(id="outcome"):
+            yield widgets.TextPanel(id="verdict")
+            yield widgets.LinePanel(id="consequences")
         with VerticalScroll(id="details"):
-            yield widgets.TextPanel("Held-out poses, before and after", classes="title")
-            yield widgets.TextPanel(id="comparison")
+            yield titled(widgets.LinePanel(id="scope"), "What it holds for")
             with Horizontal(id="plots"):
-                for number in range(PLOTS):
-                    yield widgets.PlotPanel(id=f"plot-{number}", classes="plot")
-            with Vertical():
-                yield widgets.TextPanel("Parameters", classes="title")
-                yield widgets.TextPanel(id="parameters-header", classes="table-header")
-                yield widgets.TextPanel(id="parameters")
-                yield widgets.TextPanel("The change of the controller's config", classes="title")
-                yield widgets.TextPanel(id="change")
+                yield PlotPanel(id="plot-deviation")
+                yield PlotPanel(id="plot-residual")
+                yield PlotPanel(id="plot-accuracy")
+            with titled(Vertical(), "Parameters"):
+                yield widgets.TextPanel(id="frames")
+                yield widgets.Table(PARAMETER_COLUMNS, id="parameters", is_read=True)
+            yield titled(widgets.TextPanel(id="change"), "The change of the controller's config")
 
 
 class HistoryScreen(TabScreen):
-    """The runs above, what was asked about one of them below."""
+    """The runs beside the course of the error, and below what was asked about one of them."""
 
     TAB = "history"
     AUTO_FOCUS = "#runs"
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("v", "about('compare')", "Compare with the one before", show=False),
-        Binding("b", "about('roll back')", "Go back to its config, or undo it", show=False),
-        Binding("w", "write", "Write its proposal", show=False),
-        Binding("o", "app.perform('drift')", "Drift over all runs", show=False),
+        Binding("v", "about('compare')", "Compare"),
+        Binding("b", "about('roll back')", "Restore or undo"),
+        Binding("w", "write", "Write its proposal"),
+        Binding("o", "app.perform('drift')", "Drift"),
     ]
 
     is_asked = False
 
     def _parts(self) -> ComposeResult:
-        yield widgets.TextPanel(id="history-header", classes="table-header")
-        yield widgets.RowList(id="runs")
-        yield widgets.TextPanel("Comparison", classes="title")
-        yield widgets.TextList(id="comparison")
+        from hexacell.text.screens.past_runs import RUN_COLUMNS  # noqa: PLC0415 - see above
 
-    def draw(self, model: ScreenModel) -> None:
+        with Horizontal(id="sides"):
+            yield titled(widgets.ChoiceTable(RUN_COLUMNS, id="runs"), "Runs, the latest first")
+            yield PlotPanel(id="trend")
+        yield titled(widgets.TextList(id="comparison"), "What was asked")
+
+    def draw(self, model: ScreenModel, has_effect: Callable[[str], bool]) -> None:
         """Show what is so now."""
         self.is_asked = model.question() is not None
-        super().draw(model)
+        super().draw(model, has_effect)
 
     async def action_about(self, what: str) -> None:
         """Do something about the run that is chosen."""
-        if (run := self.query_one(widgets.RowList).chosen) is not None:
+        if (run := self.query_one(widgets.Table).chosen) is not None:
             await self.run_action(f"app.perform({what!r}, {run!r})")
 
     async def action_write(self) -> None:
@@ -181,6 +174,6 @@ class HistoryScreen(TabScreen):
         else:
             await self.action_about("apply")
 
-    async def on_option_list_option_selected(self) -> None:
-        """Open the run."""
+    async def on_data_table_row_selected(self) -> None:
+        """Show the run again."""
         await self.action_about("open")

@@ -21,7 +21,7 @@ AGAIN_AFTER_S = 3.0
 
 
 class RunFollower:
-    """A run as a screen sees it; ``on_end`` is called when it has sent everything.
+    """A run as a screen sees it; ``on_end`` is called when it has sent everything, ``on_change`` meanwhile.
 
     Attributes:
         connection: the run that is followed; None when it is over.
@@ -30,11 +30,13 @@ class RunFollower:
         runs: number of runs followed.
     """
 
-    def __init__(self, now: Callable[[], float], on_end: Callable[[], None]) -> None:
+    def __init__(
+        self, now: Callable[[], float], on_end: Callable[[], None], on_change: Callable[[], None]
+    ) -> None:
         self.picture = RunPicture()
         self.questions = 0
         self.runs = 0
-        self._now, self._on_end = now, on_end
+        self._now, self._on_end, self._on_change = now, on_end, on_change
         self._is_left = False
         self.connection: RunConnection | None = None
         self._following: asyncio.Task[None] | None = None
@@ -77,6 +79,7 @@ class RunFollower:
         finally:
             if self.connection is connection:
                 self.connection = None
+        self._on_change()
         if self._is_left:
             return
         if self.picture.status is not Status.ENDED and not self.picture.is_recorded:
@@ -88,6 +91,7 @@ class RunFollower:
         self.picture = picture_after(self.picture, message, self._now())
         if self.picture.question not in {None, question}:
             self.questions += 1
+        self._on_change()
 
 
 class DeviceWatcher:
@@ -98,11 +102,16 @@ class DeviceWatcher:
         problem: why there are no values; empty if there are.
     """
 
-    def __init__(self, watch: Callable[[], AsyncIterator[LiveSnapshot]], now: Callable[[], float]) -> None:
+    def __init__(
+        self,
+        watch: Callable[[], AsyncIterator[LiveSnapshot]],
+        now: Callable[[], float],
+        on_change: Callable[[], None],
+    ) -> None:
         self.live: LiveSnapshot | None = None
         self.live_at_s = 0.0
         self.problem = ""
-        self._watch, self._now = watch, now
+        self._watch, self._now, self._on_change = watch, now, on_change
         self._task: asyncio.Task[None] | None = None
 
     def start(self) -> None:
@@ -132,6 +141,8 @@ class DeviceWatcher:
             try:
                 async for snapshot in self._watch():
                     self.live, self.live_at_s, self.problem = snapshot, self._now(), ""
+                    self._on_change()
             except HexacellError as error:
                 self.live, self.problem = None, str(error)
+                self._on_change()
             await asyncio.sleep(AGAIN_AFTER_S)

@@ -1,27 +1,38 @@
-"""What the screens are made of. Text is drawn again only where it changed.
+"""What the screens are made of: text, banner, cards, tables, and the lines of tabs and keys.
 
-Textual's own footer makes a widget of each key, and all of them anew with each change of the screen, which
-takes longer than all else on it; so the keys are a line of text.
+Text is drawn again only where it changed. Textual's own footer makes a widget of each key and does not
+wrap at 80 columns, so the keys are a line of text.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from rich.text import Text
 from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.content import Content
 from textual.screen import Screen
-from textual.widgets import OptionList, Static
+from textual.widget import Widget
+from textual.widgets import DataTable, Digits, OptionList, ProgressBar, Static
 from textual.widgets.option_list import Option
 
 from hexacell.printable import printable
-from hexacell.screen.preferences import KEYS, ScreenAction
-from hexacell.text.screens.views import Line, PlotView, Urgency, plot_lines
+from hexacell.text.screens.views import Banner, Card, Column, Line, Row, Urgency
 
 if TYPE_CHECKING:
     from hexacell.screen.model import ScreenModel
+    from hexacell.text.screens.measuring import Progress
+
+URGENCY_CLASS = "urgency-{}"
+
+
+def set_urgency(widget: Widget, urgency: Urgency) -> None:
+    """Give a widget the class of an urgency, and take those of the others."""
+    for one in Urgency:
+        widget.set_class(one is urgency, URGENCY_CLASS.format(one))
 
 
 class TextPanel(Static):
@@ -37,100 +48,174 @@ class TextPanel(Static):
             self.update(text)
         if urgency is not self._urgency:
             self._urgency = urgency
-            self.set_classes([*(c for c in self.classes if not c.startswith("urgency-"))])
-            self.add_class(f"urgency-{urgency}")
+            set_urgency(self, urgency)
+
+
+class LinePanel(Static):
+    """Lines of different urgency, which are coloured by it."""
+
+    _lines: Sequence[Line] | None = None
+
+    def show(self, lines: Sequence[Line]) -> None:
+        """Show these lines."""
+        if lines != self._lines:
+            self._lines = lines
+            self.update(Content("\n").join(coloured(*line) for line in lines))
+
+
+COLOURS = {
+    Urgency.CALM: "",
+    Urgency.GOOD: "$success",
+    Urgency.ATTENTION: "bold $warning",
+    Urgency.ALARM: "bold $error",
+}
+
+
+def coloured(text: str, urgency: Urgency) -> Content:
+    """A text in the colour of an urgency."""
+    return Content.styled(printable(text), COLOURS[urgency])
 
 
 class TextList(VerticalScroll):
-    """Lines that scroll; may follow the last one."""
-
-    def __init__(self, *, id: str | None = None, classes: str | None = None, follows: bool = False) -> None:  # noqa: A002 - as in every widget
-        self._panel, self._follows = TextPanel(), follows
-        self._count, self._is_at_end = 0, False
-        super().__init__(self._panel, id=id, classes=classes)
-
-    def show(self, lines: Sequence[str]) -> None:
-        """Show these lines."""
-        self._panel.show("\n".join(lines))
-        self._count = len(lines)
-        self.on_resize()
-
-    def on_resize(self) -> None:
-        """Stay at the end until somebody scrolls; lines that all have room begin at the top."""
-        is_long = self._follows and self._count > self.size.height > 0
-        if is_long != self._is_at_end:
-            self._is_at_end = is_long
-            self.anchor(is_long)
-
-
-MOST_LINES = 6
-"""Three gauges, encoders, controller and stop line."""
-
-WORDS = ("Now", "Next", "Time", "Stop")
-
-
-class DevicePanel(Vertical):
-    """A line for each device."""
-
-    def __init__(self, *, id: str | None = None) -> None:  # noqa: A002 - as in every widget
-        self._lines = [TextPanel() for _ in range(MOST_LINES)]
-        super().__init__(*self._lines, id=id)
-
-    def show(self, lines: Sequence[Line]) -> None:
-        """Show the devices."""
-        for number, panel in enumerate(self._lines):
-            panel.display = number < len(lines)
-            if panel.display:
-                panel.show(*lines[number])
-
-
-class GuidancePanel(Vertical):
-    """Four lines, the first one emphasised."""
-
-    def __init__(self, *, id: str | None = None) -> None:  # noqa: A002 - as in every widget
-        self._lines = {word: TextPanel(classes=f"guidance-{word.lower()}") for word in WORDS}
-        super().__init__(*self._lines.values(), id=id)
-
-    def show(self, guidance: Mapping[str, str]) -> None:
-        """Show the guidance."""
-        for word, text in guidance.items():
-            self._lines[word].show(f"{word:5}{text}")
-
-
-class PlotPanel(Vertical):
-    """Drawn in characters, as large as there is room."""
+    """Lines that scroll."""
 
     def __init__(self, *, id: str | None = None, classes: str | None = None) -> None:  # noqa: A002 - as in every widget
-        self._title, self._legend = TextPanel(classes="title"), TextPanel(classes="legend")
-        self._drawing = _Drawing(classes="drawing")
-        self._view: PlotView | None = None
-        super().__init__(self._title, self._drawing, self._legend, id=id, classes=classes)
+        self._panel = LinePanel()
+        super().__init__(self._panel, id=id, classes=classes)
 
-    def show(self, view: PlotView) -> None:
-        """Show a view."""
-        if view != self._view:
-            self._view = view
-            self._title.show(view.title)
-            self._legend.show(view.note if view.is_empty else view.legend)
-            self._drawing.display = not view.is_empty
-            self._drawing.draw(view)
+    def show(self, lines: Sequence[str | Line]) -> None:
+        """Show these lines."""
+        self._panel.show([(one, Urgency.CALM) if isinstance(one, str) else one for one in lines])
 
 
-class _Drawing(TextPanel):
-    """The picture itself; drawn again when its size changes."""
+class BannerBar(Horizontal):
+    """The state in a word, and beside it what to do, what comes next, and how long it takes."""
 
-    _view: PlotView | None = None
+    def __init__(self) -> None:
+        self._word, self._action = TextPanel(classes="banner-word"), TextPanel(classes="banner-action")
+        self._following, self._rest = TextPanel(classes="banner-rest"), TextPanel(classes="banner-rest")
+        super().__init__(self._word, Vertical(self._action, self._following, self._rest))
 
-    def draw(self, view: PlotView) -> None:
-        """Draw a view."""
-        self._view = view
-        self.on_resize()
+    def show(self, banner: Banner) -> None:
+        """Show a banner."""
+        self._word.show(banner.word, banner.urgency)
+        self._action.show(banner.action)
+        self._following.show(banner.following)
+        self._rest.show(banner.rest)
 
-    def on_resize(self) -> None:
-        """Draw it as large as there is room now."""
-        if self._view is not None:
-            room = self.content_region.size
-            self.show("\n".join(plot_lines(self._view, room.width, room.height)))
+
+class CardPanel(Vertical):
+    """One device in a frame: its figure large where there is room, its lines below."""
+
+    def __init__(self) -> None:
+        self._digits, self._figure = Digits(classes="card-digits"), TextPanel(classes="card-figure")
+        self._lines = TextPanel(classes="card-lines")
+        super().__init__(self._digits, self._figure, self._lines, classes="panel card")
+
+    def show(self, card: Card) -> None:
+        """Show a device."""
+        self.border_title, self.border_subtitle = printable(card.title), printable(card.state)
+        figure = printable(card.figure)
+        is_number = any(map(str.isdigit, figure))
+        self.set_class(is_number, "-number")
+        if is_number and self._digits.value != figure:
+            self._digits.update(figure)
+        self._figure.show(figure, card.urgency)
+        self._lines.show("\n".join(card.lines))
+        set_urgency(self, card.urgency)
+
+
+MOST_CARDS = 6
+
+
+class CardGrid(Widget):
+    """A card for each device."""
+
+    def __init__(self, *, id: str | None = None) -> None:  # noqa: A002 - as in every widget
+        self._cards = [CardPanel() for _ in range(MOST_CARDS)]
+        super().__init__(*self._cards, id=id)
+
+    def show(self, cards: Sequence[Card]) -> None:
+        """Show the devices."""
+        for number, panel in enumerate(self._cards):
+            panel.display = number < len(cards)
+            if panel.display:
+                panel.show(cards[number])
+
+
+class ProgressPanel(Vertical):
+    """How far a run is: in words, and as a bar."""
+
+    def __init__(self, *, id: str | None = None, classes: str | None = None) -> None:  # noqa: A002 - as in every widget
+        self._place, self._bar = TextPanel(), ProgressBar(show_eta=False)
+        super().__init__(self._place, self._bar, id=id, classes=classes)
+
+    def show(self, progress: Progress) -> None:
+        """Show how far it is."""
+        self._place.show(progress.place)
+        self._bar.display = progress.planned > 0
+        if (self._bar.total, self._bar.progress) != (progress.planned, progress.done):
+            self._bar.update(total=progress.planned or None, progress=min(progress.done, progress.planned))
+
+
+class Table(DataTable[Text]):
+    """Rows with a name each; what is chosen stays chosen, and new rows at the end come into view."""
+
+    def __init__(self, columns: Iterable[Column], *, id: str, is_read: bool = False) -> None:  # noqa: A002 - as in every widget
+        super().__init__(
+            id=id, cursor_type="none" if is_read else "row", zebra_stripes=True, cell_padding=0
+        )
+        self._rows: list[Row] = []
+        self._theme = ""
+        self._columns, self._is_read = tuple(columns), is_read
+
+    def on_mount(self) -> None:
+        """Make the columns, whose width is fixed: figures are not cut unseen."""
+        for one in self._columns:
+            self.add_column(_cell(one, one.name, "bold"), width=one.width, key=one.name)
+
+    @property
+    def chosen(self) -> str | None:
+        """The name of the chosen row; None without rows."""
+        return (
+            self._rows[self.cursor_row].name if self._rows and self.cursor_row < len(self._rows) else None
+        )
+
+    def show(self, rows: Sequence[Row]) -> None:
+        """Show these rows; those that are there already stay as they are."""
+        rows = list(rows)
+        if (rows == self._rows and self._theme == self.app.theme) or not self.columns:
+            return
+        name, is_at_end = self.chosen, self.scroll_y >= self.max_scroll_y - 1
+        known = len(self._rows)
+        if rows[:known] != self._rows or self._theme != self.app.theme:
+            self.clear()
+            known = 0
+        for row in rows[known:]:
+            style = _rich_style(self.app.theme_variables, row.urgency)
+            cells = zip(self._columns, row.cells, strict=True)
+            self.add_row(*(_cell(column, text, style) for column, text in cells), key=row.name)
+        self._rows, self._theme = rows, self.app.theme
+        if self._is_read and is_at_end:
+            self.call_after_refresh(self.scroll_end, animate=False)
+        elif name is not None and (found := [n for n, one in enumerate(rows) if one.name == name]):
+            self.move_cursor(row=found[0])
+
+
+class ChoiceTable(Table):
+    """A table of which a row is chosen, and something is done with it by Enter."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "select_cursor", "Show", key_display="Enter")]
+
+
+def _cell(column: Column, text: str, style: str) -> Text:
+    return Text(printable(text), style, justify="right" if column.is_figure else "left")
+
+
+def _rich_style(variables: Mapping[str, str], urgency: Urgency) -> str:
+    """The colour of an urgency as Rich, which draws the cells of tables, names it."""
+    words = COLOURS[urgency].split()
+    return " ".join(variables[word.removeprefix("$")] if word.startswith("$") else word for word in words)
 
 
 class RowList(OptionList):
@@ -163,17 +248,17 @@ TABS = ("cell", "preflight", "measure", "review", "history")
 
 
 class TopLine(Horizontal):
-    """The cell, what is done there, its state, and who is in control."""
+    """The cell and what is done there, and who is in control."""
 
     def compose(self) -> ComposeResult:
-        """Left what is done, right how it stands."""
+        """Left what is done, right who does it."""
         yield TextPanel("hexacell", id="where")
-        yield TextPanel("starting", id="state")
+        yield TextPanel("starting", id="who")
 
-    def show(self, where: str, state: str, urgency: Urgency) -> None:
-        """Show what is done where, and how it stands."""
+    def show(self, where: str, who: str) -> None:
+        """Show what is done where, and by whom."""
         self.query_one("#where", TextPanel).show(where)
-        self.query_one("#state", TextPanel).show(state, urgency)
+        self.query_one("#who", TextPanel).show(who)
 
 
 class TabLine(Static):
@@ -182,7 +267,7 @@ class TabLine(Static):
     def __init__(self, present: str, keys: Mapping[str, str]) -> None:
         parts = [
             Content.from_markup(
-                f"[@click=app.show('{name}')]{'[reverse b]>' if name == present else ' '}$text "
+                f"[@click=app.show('{name}')]{'[reverse b]▸' if name == present else ' '}$text "
                 f"{'[/]' if name == present else ''}[/]",
                 text=f"{keys[name]} {name.capitalize()}",
             )
@@ -191,40 +276,37 @@ class TabLine(Static):
         super().__init__(Content("  ").join(parts))
 
 
-_ACTIONS = {
-    f"perform('{action}')": action
-    for action in ScreenAction
-    if any(one.show and one.action == f"perform('{action}')" for one in KEYS)
-}
-"""The actions that may have no effect, by what a key performs."""
-
-
 class KeyLine(Static):
-    """A key with its word each; a click does the same."""
+    """The keys that act here and now, a word each; a click does the same."""
 
-    def __init__(self, keys: Mapping[str, str]) -> None:
-        self._keys = keys
-        self._has_effect = dict.fromkeys(_ACTIONS.values(), False)
-        super().__init__(self._content())
+    _shown: tuple[tuple[str, str, str], ...] = ()
 
-    def show(self, allows: Callable[[ScreenAction], bool]) -> None:
-        """Show which keys have an effect."""
-        has_effect = {action: allows(action) for action in self._has_effect}
-        if has_effect != self._has_effect:
-            self._has_effect = has_effect
-            self.update(self._content())
+    def show(self, has_effect: Callable[[str], bool]) -> None:
+        """Show the keys of the screen and those of every screen, without those that have no effect now."""
+        every = self.screen.active_bindings.values()
+        # Those of the screen come first.
+        bindings = [one.binding for one in sorted(every, key=lambda one: one.node is self.app)]
+        shown = {
+            one.action: (one.key_display or self.app.get_key_display(one), one.description)
+            for one in reversed(bindings)
+            if one.show and has_effect(one.action)
+        }
+        parts = tuple((action, *shown[action]) for action in reversed(shown))
+        if parts != self._shown:
+            self._shown = parts
+            self.update(Content("  ").join(_key(*part) for part in parts))
 
-    def _content(self) -> Content:
-        parts = []
-        for one in KEYS:
-            if one.show:
-                call = one.action if one.action.endswith(")") else f"{one.action}()"
-                has_effect = one.action not in _ACTIONS or self._has_effect[_ACTIONS[one.action]]
-                text = "[b]$key[/b] $word" if has_effect else "[dim][b]$key[/b] $word[/dim]"
-                key, word = self._keys[str(one.id)], one.description
-                parts.append(Content.from_markup(f"[@click=app.{call}]{text}[/]", key=key, word=word))
-        palette = Content.from_markup("[@click=app.command_palette()]^p palette[/]")
-        return Content("  ").join([*parts, palette])
+
+def _key(action: str, key: str, word: str) -> Content:
+    call = action if "." in action else f"screen.{action}" if action in _OF_SCREEN else f"app.{action}"
+    call = call if call.endswith(")") else f"{call}()"
+    return Content.from_markup(
+        f"[@click={call}][b]$key[/b]\u00a0$word[/]", key=key, word=word.replace(" ", "\u00a0")
+    )
+
+
+_OF_SCREEN = ("write", "about('compare')", "about('roll back')", "exclude", "dismiss", "unfold", "file")
+"""Actions that a screen has itself."""
 
 
 def show_parts(screen: Screen[Any], model: ScreenModel, name: str) -> None:
@@ -232,3 +314,10 @@ def show_parts(screen: Screen[Any], model: ScreenModel, name: str) -> None:
     for part, shown in model.shown(name).items():
         widget: Any = screen.query_one(f"#{part}")
         widget.show(*shown)
+
+
+def titled(widget: Widget, title: str) -> Widget:
+    """A widget in a frame with a title."""
+    widget.border_title = title
+    widget.add_class("panel")
+    return widget

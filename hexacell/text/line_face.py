@@ -118,11 +118,11 @@ def activity(event: events.Event) -> str | None:
 
 def event_text(event: events.Event, state: RunState) -> str | None:
     """What an event reports, if anything, in lines that fit a terminal; ``state`` includes the event."""
-    text = _whole_text(event, state)
+    text = whole_event_text(event, state)
     return None if text is None else "\n".join(wrapped(line, indent=2) for line in text.splitlines())
 
 
-def _whole_text(event: events.Event, state: RunState) -> str | None:
+def whole_event_text(event: events.Event, state: RunState) -> str | None:
     """What an event reports, in lines of any length."""
     match event:
         case events.RunStarted(mode=mode, accepted=accepted):

@@ -24,7 +24,13 @@ from tests.screen.served_cell import NAME, served_in
 LIVE_S, KEY_S, QUIT_S = 1.5, 0.1, 0.5
 RUNS = sample(__name__, "RUNS")
 ROUNDS = 8
-TABS = {"1": rb">1 Cell", "2": rb">2 Pre", "3": rb">3 Mea", "4": rb">4 Rev", "5": rb">5 His"}
+TABS = {
+    "1": "▸1 Cell".encode(),
+    "2": "▸2 Pre".encode(),
+    "3": "▸3 Mea".encode(),
+    "4": "▸4 Rev".encode(),
+    "5": "▸5 His".encode(),
+}
 """What each screen has marked in its second line."""
 READING = rb"\d\.\d{4}.{0,20}mm"
 

@@ -14,15 +14,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from textual.app import App
+from textual.widgets import Digits
 
 from hexacell.cli.commands.status import escaped
 from hexacell.cli.console import Console
 from hexacell.cli.process import fault_line, log
 from hexacell.printable import printable
 from hexacell.runs.run_folder import runs_folder
-from hexacell.screen.widgets import RowList, TextPanel
+from hexacell.screen.widgets import CardPanel, ChoiceTable, LinePanel, RowList, TextPanel
 from hexacell.storage.output_files import LOG, OutputFile
 from hexacell.text.report.pages import html_of
+from hexacell.text.screens.views import Card, Column, Row, Urgency
 from procedures.journal.journal import encode, read_entries
 from procedures.steps import events
 from tests.hexacell.services.notify.notices import a_notice
@@ -81,6 +83,9 @@ async def test_no_widget_has_any() -> None:
         def compose(self):
             yield TextPanel(HOSTILE)
             yield RowList()
+            yield LinePanel()
+            yield CardPanel()
+            yield ChoiceTable([Column("a", 20)], id="table")
 
     app = OneOfEach()
     async with app.run_test(size=(120, 20)) as pilot:
@@ -91,6 +96,15 @@ async def test_no_widget_has_any() -> None:
         panel.show(f"again {HOSTILE}")
         assert raw_signs(str(panel.render())) == []
         assert "[red]" in str(panel.content)
+        lines, card, table = app.query_one(LinePanel), app.query_one(CardPanel), app.query_one(ChoiceTable)
+        lines.show([(HOSTILE, Urgency.ALARM)])
+        card.show(Card(HOSTILE, HOSTILE, Urgency.GOOD, f"{HOSTILE} 1.5", (HOSTILE,)))
+        table.show([Row("1", (HOSTILE,))])
+        await pilot.pause()
+        shown = f"{lines.content}{card.border_title}{card.border_subtitle}{table.get_row_at(0)[0].plain}"
+        shown += "".join(str(one.content) for one in card.query(TextPanel)) + card.query_one(Digits).value
+        assert raw_signs(shown) == []
+        assert shown.count("[red]") == 7
         await asyncio.sleep(0)
 
 

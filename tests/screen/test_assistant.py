@@ -64,7 +64,7 @@ async def test_the_questions_lead_to_a_valid_cell_file(path: Path) -> None:
             before = shown(pilot)
             await pilot.press("enter")
             await until(partial(is_other, pilot, before))
-        await until_shown(pilot, "What cell.toml says")
+        await until_shown(pilot, "robot       hexaglide")
     cell = load_cell(path)
     assert cell.settings.name == "cell"
     assert cell.config_path.name == "robot-geometry.toml"

@@ -15,7 +15,7 @@ from hexacell.errors import FileError, UsageError
 from hexacell.run_process.messages import LiveSnapshot
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.model import ScreenModel
-from hexacell.screen.overlays import ConfirmOverlay, FaultOverlay
+from hexacell.screen.overlays import ConfirmOverlay
 from hexacell.screen.preferences import ScreenAction
 from hexacell.screen.workplace import Workplace
 from hexacell.services.write_back.config_history import config_history
@@ -26,7 +26,7 @@ from hexacell.verdict.acceptance_gates import AcceptanceGate
 from tests.hexacell.services.proposed_runs import ProposedRun, a_cell, committed_runs, propose_run
 from tests.mutations.journals import with_checksum
 from tests.screen.conftest import attended, settled
-from tests.screen.test_job import press, shown, until_shown
+from tests.screen.test_job import press, shown, until_noticed, until_shown
 from tests.waiting import until
 
 pytestmark = pytest.mark.usefixtures("records_agree")
@@ -139,8 +139,7 @@ async def test_an_open_proposal_is_written_once_it_is_approved(cell: Cell, left:
         assert "Restart or reload the controller" in shown(pilot)
         await until(lambda: latest_line(pilot).endswith("in controller"))
         await press(pilot, "w")
-        await until(lambda: isinstance(pilot.app.screen, FaultOverlay))
-        await until_shown(pilot, "has no proposal that could be written")
+        await until_noticed(pilot, "has no proposal that could be written")
     assert cell.config_path.read_bytes() == left.after
 
 

@@ -1,9 +1,11 @@
 """A technician's whole job at the screen, from mounting the gauges to approving the change."""
 
+import re
 from collections.abc import Sequence
 
 import pytest
 from textual.pilot import Pilot
+from textual.widgets import DataTable, Static
 
 from drivers.interfaces import StartupAction
 from hexacell.cell.loader import Cell
@@ -14,7 +16,6 @@ from hexacell.run_process.client import LOST
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.child import Preflight
 from hexacell.screen.overlays import ConfirmOverlay, FaultOverlay, QuestionOverlay
-from hexacell.screen.widgets import TextPanel
 from hexacell.text.screens.measuring import RESUMABLE
 from hexacell.text.screens.views import ChecklistItem, Mark
 from procedures.engine.command_loop import Status
@@ -40,7 +41,17 @@ PLACED_AT, IDENTIFIED, PROPOSED = 6, 333, 455
 
 def shown(pilot: Pilot[int]) -> str:
     """All text of the screen in front."""
-    return "\n".join(str(panel.content) for panel in pilot.app.screen.query(TextPanel))
+    screen = pilot.app.screen
+    texts = [str(panel.content) for panel in screen.query(Static)]
+    texts += [f"{one.border_title} {one.border_subtitle}" for one in screen.query(".panel")]
+    for table in screen.query(DataTable):
+        texts += [" ".join(map(str, table.get_row_at(row))) for row in range(table.row_count)]
+    return "\n".join(texts)
+
+
+async def until_noticed(pilot: Pilot[int], text: str) -> None:
+    """Until a notice that goes away by itself says something."""
+    await until(lambda: any(text in one.message for one in pilot.app._notifications))
 
 
 async def press(pilot: Pilot[int], *keys: str) -> None:
@@ -78,9 +89,9 @@ async def test_from_mounting_to_approval(cell, run, history, opened) -> None:
     async with opened(workplace_of(cell, run, history[:PLACED_AT])) as pilot:
         run.tell(snapshot(x={"shown_mm": -1.2}))
         run.ask(ask_placement(SetKey(phase=Phase.IDENTIFY, point=1), Pose(0.0, 0.0, 550.0)))
-        await until_shown(pilot, "move the x gauge 1.2 mm in (along -x)")
+        await until_shown(pilot, "→ x  move it 1.2 mm in, along -x")
         run.tell(snapshot(x={"shown_mm": 0.1}))
-        await until_shown(pilot, "ok, 0.1 mm from mid travel")
+        await until_shown(pilot, "✓ x  in place, 0.1 mm from mid travel")
         await press(pilot, "escape", "1")  # a question may wait while one looks at the screens
         assert not isinstance(pilot.app.screen, QuestionOverlay)
         await press(pilot, "w", "enter")
@@ -94,7 +105,7 @@ async def test_from_mounting_to_approval(cell, run, history, opened) -> None:
         run.record(history[IDENTIFIED:PROPOSED])
         run.ask(ask_approval(PendingChange(proposed.gates, "-  old\n+  new"), cell=cell.settings.name))
         await until_shown(pilot, "+  new")
-        assert "ok  The residuals agree with the stated noise." in shown(pilot)
+        assert "✓ The residuals agree with the stated noise." in shown(pilot)
         await press(pilot, "y")
         assert run.given[1:] == [Answer("a person at the screen")]
 
@@ -104,21 +115,24 @@ async def test_from_mounting_to_approval(cell, run, history, opened) -> None:
         await until(lambda: not isinstance(pilot.app.screen, QuestionOverlay))
         await press(pilot, "4")
         await until_shown(pilot, "PASS: The error and the guard band together are within the limit.")
-        assert "S1y       -155.000    -160.751    -5.751    0.095  changed (60." in shown(pilot)
+        assert "Teach anew" in shown(pilot)
+        assert re.search(r"S1y -\d+\.\d{3} -\d+\.\d{3} -5\.751 0\.095 +changed \(60", shown(pilot))
 
 
 async def test_one_key_each_for_who_is_in_control(cell, run, history, opened) -> None:
     async with opened(workplace_of(cell, run, history[:300])) as pilot:
         await until_shown(pilot, "point 5")
-        await press(pilot, "P", "u", "m", "p", "a")
+        await press(pilot, "P", "u", "m", "p", "a", "n")
+        assert Abort() not in run.given, "it is confirmed first"
+        await press(pilot, "a", "y")
         again = MeasureAgain(SetKey(phase=Phase.IDENTIFY, point=5))
         assert run.given == [Pause(at_once=True), Undo(), again, Pause(), Abort()]
         run.tell(messages.StatusChanged(status=Status.PAUSED))
-        await until_shown(pilot, "paused: the robot stands still")
+        await until_shown(pilot, "PAUSED")
         await press(pilot, "p")
         assert run.given.pop() == Resume()
         run.tell(messages.ControlChanged(is_in_control=False, who="grace"))
-        await until_shown(pilot, "you only watch: grace is in control; c takes over")
+        await until_shown(pilot, "You only watch: grace is in control; c takes over")
         await press(pilot, "p", "c")
         assert len(run.given) == 5
         assert run.taken == 1
@@ -139,7 +153,7 @@ async def test_motion_begins_on_an_explicit_yes_and_a_fault_says_what_to_do(cell
         await press(pilot, "enter")
         assert not isinstance(pilot.app.screen, FaultOverlay)
         run.ask(ask_recovery("gauge y answers in inch. Press the in/mm key", (Action.RETRY, Action.ABORT)))
-        await until_shown(pilot, "retry: try the same again")
+        await until_shown(pilot, "try the same again")
         await press(pilot, "1")
         assert run.given == [Answer("yes"), Answer("retry")]
 
@@ -152,7 +166,7 @@ async def test_a_fault_that_the_run_has_left_behind_is_not_shown_on_attaching(ce
     interrupted = events.Interrupted(reason="it drifts", exit_code=1)
     told = [*history[:100], tripped_by(Guard.DRIFT), interrupted, *history[100:300]]
     async with attended(workplace_of(cell, run, told)) as model:
-        await until(lambda: "point 5" in model.shown("measure")["guidance"][0]["Now"])
+        await until(lambda: "point 5" in model.banner("measure").action)
         assert model.fault() is None
 
 
@@ -168,9 +182,9 @@ async def test_a_fault_that_the_run_has_left_behind_is_not_shown_on_attaching(ce
                 messages.HostFailed(problem="aborted", exit_code=130),
             ),
             ("The run ended early", "aborted", RESUMABLE),
-            "ended early: aborted",
+            "aborted",
         ),
-        ((LOST,), ("The run could not go on", LOST.problem, LOST.action), f"ended early: {LOST.problem}"),
+        ((LOST,), ("The run could not go on", LOST.problem, LOST.action), LOST.problem),
     ],
     ids=["it was aborted", "its process died"],
 )
@@ -185,14 +199,14 @@ async def test_the_end_of_a_run_is_a_single_fault_and_it_is_not_shown_as_running
     async with attended(workplace_of(cell, run, history[:300])) as model:
         run.tell(*ending)
         run.end()
-        await until(lambda: "ENDED" in model.header()[1])
+        await until(lambda: model.banner("measure").word == "ENDED EARLY")
         shown_fault = model.fault()
         assert shown_fault is not None
         assert (shown_fault.title, shown_fault.cause, shown_fault.action) == fault
         assert model.fault_number == 1001
-        guidance = model.shown("measure")["guidance"][0]
-        assert guidance["Now"] == now
-        assert guidance["Next"].startswith("2 Preflight resumes it with r")
+        shown_banner = model.banner("measure")
+        assert shown_banner.following.lower() == now.lower()
+        assert shown_banner.action.startswith("Press 2, then r resumes it")
 
 
 @pytest.mark.parametrize(
@@ -223,15 +237,16 @@ async def test_a_run_begins_once_everything_holds_that_must_hold(cell, run, open
         await press(pilot, "p", "u", "m", "a")  # these do nothing without a run
         assert not isinstance(pilot.app.screen, FaultOverlay)
         await press(pilot, "2")
-        for key in ("s", "k", "K", "r", "l", "L"):
+        started: list[str] = []
+        for key in ("s", "k", "K", "l", "L"):
+            workplace.checked.clear()
             await press(pilot, key)
-            await until_shown(pilot, "not everything holds that must hold")
-            await press(pilot, "enter")
-        wanted = ["optimise", "check", "quick", "resume", "length", "optimise with length check"]
-        assert workplace.checked == wanted
-        listed = str(pilot.app.screen.query_one("#checklist TextPanel", TextPanel).content)
-        assert "NO  gauge y: it answers in inch" in listed
-        assert "-> Press the in/mm key" in listed
+            await until(lambda: len(workplace.checked) == 1)
+            started.append(*workplace.checked)
+            await until_shown(pilot, "NOT READY")
+        assert started == ["optimise", "check", "quick", "length", "optimise with length check"]
+        assert "✗ gauge y: it answers in inch" in shown(pilot)
+        assert "→ Press the in/mm key" in shown(pilot)
         assert workplace.begun == []
         workplace.preflight = holds
         await press(pilot, "s")

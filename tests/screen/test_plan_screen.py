@@ -13,12 +13,11 @@ from hexacell.dry_run.campaign import VisitedPose
 from hexacell.errors import UsageError
 from hexacell.kinematics.pose import Pose
 from hexacell.screen.child import TriedPlan
-from hexacell.screen.overlays import FaultOverlay
 from hexacell.screen.preferences import ONCE, ScreenAction
 from hexacell.screen.widgets import RowList
 from hexacell.services.preflight import toggle_exclusion
 from tests.screen.conftest import attended
-from tests.screen.test_job import press, shown, until_shown
+from tests.screen.test_job import press, shown, until_noticed, until_shown
 from tests.screen.told_run import ToldRun, ToldWorkplace, snapshot
 from tests.waiting import until
 
@@ -76,8 +75,7 @@ async def test_a_key_excludes_in_the_cell_file_and_the_plan_is_tried_anew(cell, 
         await press(pilot, "home", "x")
         await until(lambda: "OUT" not in rows(pilot)[0])
         await press(pilot, "home", "down", "x")  # the reference of the first point
-        await until(lambda: isinstance(pilot.app.screen, FaultOverlay))
-        assert "1.1 is the reference of its point" in shown(pilot)
+        await until_noticed(pilot, "1.1 is the reference of its point")
         assert workplace.cell.path.read_text() == before
 
 

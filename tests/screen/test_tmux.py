@@ -64,7 +64,7 @@ def terminal(tmp_path: Path) -> Iterator[Terminal]:
 def test_a_run_is_begun_left_and_stopped_at_the_screen(served: Path, terminal: Terminal) -> None:
     tui = (sys.executable, "-m", "hexacell", "tui", str(served))
     terminal.open(*tui)
-    terminal.wait_for(" mm  ")  # a gauge shows something
+    terminal.wait_for("um, 0.")  # a gauge shows something
     terminal.press("2")
     terminal.wait_for("What must hold before the robot moves")
     terminal.press("s")
@@ -77,7 +77,7 @@ def test_a_run_is_begun_left_and_stopped_at_the_screen(served: Path, terminal: T
     terminal.open(*tui)
     terminal.wait_for("1/3 ")
     terminal.press("p")
-    terminal.wait_for("paused: the robot stands still")
+    terminal.wait_for("PAUSED")
     terminal.press("q")
     terminal.wait_for("A run goes on here")
     terminal.press("s")

@@ -14,7 +14,7 @@ from hexacell.services.offline import try_plan
 from hexacell.services.run.calibration_run import new_calibration, preflight
 from hexacell.text.layout import wrapped
 from hexacell.text.planning import plan_trial_lines, preflight_lines, quick_trial_text
-from hexacell.text.screens.live import exclusions_text
+from hexacell.text.screens.checklist import exclusions_text
 from procedures.calibration.calibration import Mode
 
 MISSING = (PortLost, GaugeSilent, WrongAnswer, BusError, SilentNodeError, ConnectionLost)

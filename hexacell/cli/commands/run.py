@@ -27,7 +27,7 @@ from hexacell.services.unattended import unattended_runs
 from hexacell.services.unattended.notice import RunEnd
 from hexacell.text.layout import wrapped
 from hexacell.text.line_face import LETTERS
-from hexacell.text.screens.live import exclusions_text
+from hexacell.text.screens.checklist import exclusions_text
 from hexacell.text.verdict import teaching_line, teaching_sentence
 from procedures.calibration.calibration import Mode, expected_records
 from procedures.engine.commands import CommandQueue, UnattendedOperator

@@ -2,9 +2,10 @@
 
 from dataclasses import replace
 
+from hexacell.kinematics.pose import Pose
 from hexacell.run_process.messages import LiveSnapshot
 from hexacell.text.config_changes import pending_text
-from hexacell.text.screens.views import Choice, QuestionView, Urgency
+from hexacell.text.screens.views import Beside, Choice, QuestionView, Urgency
 from hexacell.text.terms import found_sentence
 from hexacell.text.verdict import improvement_sentence, teaching_sentence
 from hexacell.verdict.acceptance_gates import AcceptanceGate
@@ -30,8 +31,8 @@ def question_view(
             return _placement(place, live)
         case questions.PendingChange(gates=gates, displacement=moved, improvement=improvement) as pending:
             gain = improvement_sentence(improvement)
-            lines = "\n".join(f"{'ok' if gate.passed else 'NO'}  {gate.sentence}" for gate in gates)
-            facts = lines, found_sentence(pending.found), gain, teaching_sentence(moved)
+            lines = "\n".join(f"{'✓' if gate.passed else '✗'} {gate.sentence}" for gate in gates)
+            facts = teaching_sentence(moved), gain, found_sentence(pending.found), lines
             title = "Write the new geometry into the controller's config?"
             view = _consenting(question, person, "write it", title)
             change, refusal = f"The change:\n{pending_text(pending)}", approval_refusal(gates)
@@ -46,7 +47,7 @@ def question_view(
             return replace(view, paragraphs=shown, urgency=Urgency.ALARM)
         case questions.StepFailure(problem=problem):
             choices = (
-                Choice(str(number), f"{choice}: {RECOVERIES.get(choice, 'do that')}", choice)
+                Choice(str(number), RECOVERIES.get(choice, choice), choice, typed=choice)
                 for number, choice in enumerate(question.choices, start=1)
             )
             return QuestionView(
@@ -54,7 +55,7 @@ def question_view(
                 paragraphs=(problem,),
                 instruction="Mend it, then press a number:",
                 choices=tuple(choices),
-                shows_gauges=True,
+                beside=Beside.GAUGES if "gauge" in problem else Beside.NOTHING,
                 urgency=Urgency.ALARM,
             )
         case questions.UnreadyController(problem=problem, request=request):
@@ -70,10 +71,9 @@ def question_view(
 
 
 def _placement(place: questions.GaugePlacement, live: LiveSnapshot | None) -> QuestionView:
-    where = f"The robot holds the ball at {place.pose}."
     if place.seat is None:
         title = f"Put the gauges around the ball at {place.station}"
-        how = "Put them around the ball, then bring each plunger to the middle of its travel:"
+        how = "Bring each plunger to the middle of its travel."
     else:
         title = f"Mount the gauges in seat {place.seat} of the fixture ({place.station})"
         how = "Mount them the same way round. Do not zero them, and leave the fixture where it is."
@@ -86,14 +86,34 @@ def _placement(place: questions.GaugePlacement, live: LiveSnapshot | None) -> Qu
         f"the {one.name} gauge on its {'+' if one.sign > 0 else '-'}{one.axis} side"
         for one in (live.gauges if live is not None else ())
     ]
-    all_sides = [f"All plungers point to the ball: {', '.join(sides)}."] if live is not None else []
+    all_sides = f"All plungers point to the ball: {', '.join(sides)}." if sides else ""
     return QuestionView(
         title=title,
-        paragraphs=(where, *all_sides, how),
-        instruction="Press Enter when all gauges say ok.",
+        paragraphs=(
+            how,
+            *filter(None, (all_sides,)),
+            f"The robot holds the ball at {_pose_text(place.pose)}.",
+        ),
+        instruction="Press Enter when all three are in place.",
         choices=(Choice("enter", "they are in place: measure", questions.PLACED, is_consent=True),),
-        shows_gauges=True,
+        beside=Beside.PLACING,
     )
+
+
+def _pose_text(pose: Pose) -> str:
+    """A pose with its units."""
+    place, angles = pose.as_tuple()[:3], pose.as_tuple()[3:]
+    millimetres = ", ".join(f"{axis} {value:.1f}" for axis, value in zip("xyz", place, strict=True))
+    degrees = ", ".join(f"{axis} {value:.1f}" for axis, value in zip("abc", angles, strict=True))
+    return f"{millimetres} mm; {degrees} deg"
+
+
+ABORTING = QuestionView(
+    title="End this run?",
+    paragraphs=("The robot stops after its step. What was measured is kept: r in 2 Preflight resumes it.",),
+    instruction="Press y or n.",
+    choices=(Choice("y", "yes, end it", questions.YES, is_consent=True), Choice("n", "no, go on", None)),
+)
 
 
 def approval_refusal(gates: tuple[AcceptanceGate, ...]) -> str:

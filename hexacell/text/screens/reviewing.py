@@ -1,63 +1,100 @@
-"""Views of results: the review of a run, verdict and scope first, and the list of past runs."""
+"""The review of a run: its verdict, what follows from it, its parameters, and how it came about."""
 
 import numpy as np
 
 from hexacell.cell.model import CellSettings
 from hexacell.text.config_changes import pending_text
-from hexacell.text.line_face import event_text
-from hexacell.text.parameters import parameter_table, rows_of_run
+from hexacell.text.line_face import whole_event_text
+from hexacell.text.parameters import rows_of_run
+from hexacell.text.screens.banner import verdict_urgency
 from hexacell.text.screens.questions import PERSON, approval_refusal
 from hexacell.text.screens.run_picture import RunPicture
-from hexacell.text.screens.views import Choice, PlotView, QuestionView, Series, Urgency
-from hexacell.text.verdict import VERDICT_MEANINGS
-from hexacell.verdict.decision import Verdict
+from hexacell.text.screens.views import Choice, Column, Line, PlotView, QuestionView, Row, Series, Urgency
+from hexacell.text.verdict import VERDICT_MEANINGS, teaching_sentence
 from hexacell.verdict.verification import DeviationStatistics
 from procedures.run.keys import Phase
 from procedures.run.questions import PendingChange, WrittenResult
 from procedures.run.state import RunState
 
 PROPOSAL_WAITS = "Its proposal can still be written: w asks for it, with the change."
-READING = "Reading the runs of this cell ..."
-WHAT_TO_PRESS = (
-    "Enter  watch the chosen run again      v  compare it with the one before it",
-    "b      go back to the config that it wrote; if the controller has it: undo it",
-    "w      write its proposal, where it has one, into the controller's config",
-    "o      the drift of each parameter over all runs",
+
+PARAMETER_COLUMNS = (
+    Column("parameter", 13),
+    *(Column(name, 12, is_figure=True) for name in ("config now", "new config", "changed by")),
+    Column("sigma", 9, is_figure=True),
+    Column("  meaning", 24),
 )
 
-URGENCIES = {None: Urgency.CALM, Verdict.PASS: Urgency.CALM, Verdict.FAIL: Urgency.ALARM}
-"""How much attention a verdict needs, if there is one; all others need some."""
+FRAMES = (
+    "The config's numbers are in the frames that move your taught points least. What changed, and its "
+    "sigma, are in the frames {frame}, where a choice of frames is no change."
+)
 
 
-def review_texts(
-    picture: RunPicture, settings: CellSettings | None, *, may_write: bool = False
-) -> dict[str, str]:
-    """The texts of a result, by the part of the screen that shows each; the verdict first.
+def review_lines(picture: RunPicture, *, may_write: bool = False) -> tuple[Line, list[Line], list[Line]]:
+    """The verdict in words, what follows from it, and what it is of.
 
     ``may_write`` is whether this is a recorded run whose proposal can be written.
     """
-    state, subject = picture.state, picture.question and picture.question.subject
-    change = pending_text(subject) if isinstance(subject, PendingChange) else ""
-    verdict = "No verdict yet: it is given once the held-out poses are measured."
+    state = picture.state
+    verdict = ("No verdict yet: it is given once the held-out poses are measured.", Urgency.CALM)
     if state.verdict is not None:
-        verdict = f"{state.verdict.upper()}: {VERDICT_MEANINGS[state.verdict]}"
-    header, *parameters = parameter_table(rows_of_run(state, settings))
-    return {
-        "verdict": verdict,
-        "scope": "\n".join(_scope(state)),
-        "approval": f"{_approval(picture)} {PROPOSAL_WAITS}" if may_write else _approval(picture),
-        "comparison": "\n".join(_comparison(state)),
-        "parameters-header": header,
-        "parameters": "\n".join(parameters) or "The geometry is not identified yet.",
-        "change": change or "There is no change yet.",
-    }
+        verdict = (
+            f"{state.verdict.upper()}: {VERDICT_MEANINGS[state.verdict]}",
+            verdict_urgency(state.verdict),
+        )
+    moved = teaching_sentence(state.proposed.displacement) if state.proposed is not None else ""
+    approval = f"{_approval(picture)} {PROPOSAL_WAITS}" if may_write else _approval(picture)
+    waits = picture.question is not None or may_write
+    consequences = [(approval, Urgency.ATTENTION if waits else Urgency.CALM), (moved, Urgency.CALM)]
+    scope = [(line, Urgency.CALM) for line in (*_scope(state), *_comparison(state))]
+    return verdict, [line for line in consequences if line[0]], scope
+
+
+def change_text(picture: RunPicture) -> str:
+    """The change of the controller's config that waits for approval."""
+    subject = picture.question and picture.question.subject
+    return pending_text(subject) if isinstance(subject, PendingChange) else "No change waits for approval."
+
+
+def parameter_cells(state: RunState, settings: CellSettings | None) -> tuple[Row, ...]:
+    """A row for each parameter, with the config's numbers where these are known."""
+    written: dict[str, tuple[str, str]] = {}
+    rows = rows_of_run(state, settings)
+    if state.proposed is not None and state.started is not None and settings is not None:
+        every = settings.mechanism.parameters
+        now, new = (every.vector(one) for one in (state.started.controller, state.proposed.written))
+        known = {one.name: one for one in rows}
+        for at, parameter in enumerate(every.parameters):
+            if (row := known.get(parameter.name)) is not None:
+                written[parameter.name] = row.figure(float(now[at])), row.figure(float(new[at]))
+    return tuple(
+        Row(
+            one.name,
+            (
+                one.label,
+                *written.get(one.name, (one.figure(one.old), one.figure(one.new))),
+                one.figure(one.change, "+"),
+                one.figure(one.sigma),
+                f"  {one.meaning}",
+            ),
+        )
+        for one in rows
+    )
+
+
+def frames_note(state: RunState) -> str:
+    """In which frames the parameters are shown."""
+    if state.identified is None:
+        return "The geometry is not identified yet."
+    return FRAMES.format(frame=state.identified.result.frame) if state.proposed is not None else ""
 
 
 def _scope(state: RunState) -> tuple[str, ...]:
     """Scope of the verdict, without the verdict itself, which stands above it."""
     if state.judged is None:
         return ("The length scale was not checked.",) if state.identified else ()
-    lines = (event_text(state.judged, state) or "").splitlines()
+    lines = (whole_event_text(state.judged, state) or "").splitlines()
     kept = [line.removeprefix("  ") for line in lines if not line.startswith("verdict: ")]
     return tuple(kept or [state.judged.line])
 
@@ -70,18 +107,18 @@ def _approval(picture: RunPicture) -> str:
     if question is not None and isinstance(question.subject, WrittenResult):
         return "Waiting for you: w asks whether the result is kept."
     if state.rolled_back:
-        return "The old config was restored."
+        return "The old config was restored: the robot errs as before."
     if state.committed is not None:
         return f"Written to the controller, approved by {state.committed.approved_by}."
     if state.proposed is not None:
         failed = [gate.sentence for gate in state.proposed.gates if not gate.passed]
         return f"Not approved. {' '.join(failed)}".strip()
     missing = "the held-out poses with the old geometry are still to be measured"
-    if state.started is not None and state.started.mode not in {"quick", "optimise"}:
-        missing = "this run changes nothing"
-    elif state.identified is None:
+    if state.identified is None:
         missing = "the geometry is not identified"
-    return f"Approving is not possible yet: {missing}."
+    is_check = state.started is not None and state.started.mode not in {"quick", "optimise"}
+    nothing = "Nothing is to be approved: this run changes nothing."
+    return nothing if is_check else f"Approving is not possible yet: {missing}."
 
 
 def _comparison(state: RunState) -> tuple[str, ...]:
@@ -89,11 +126,10 @@ def _comparison(state: RunState) -> tuple[str, ...]:
     rows = []
     for name, phase in (("before", Phase.BEFORE), ("after", Phase.AFTER)):
         deviations = state.held_out(phase)
-        if (found := DeviationStatistics.of(deviations)) is None:
-            rows.append(f"{name:8}not measured yet")
-            continue
-        largest = float(np.linalg.norm(deviations, axis=-1).max())
-        rows.append(f"{name:8}mean {found.mean_mm:7.3f}   largest {largest:7.3f} mm   {found.poses} poses")
+        if (found := DeviationStatistics.of(deviations)) is not None:
+            largest = float(np.linalg.norm(deviations, axis=-1).max())
+            sizes = f"mean {found.mean_mm:.3f}, largest {largest:.3f} mm"
+            rows.append(f"{found.poses} held-out poses {name}: {sizes}")
     return tuple(rows)
 
 
@@ -104,7 +140,7 @@ def deviation_plot(state: RunState) -> PlotView:
         sizes = (max(float(np.linalg.norm(one)), 1e-4) for one in state.held_out(phase))
         series.append(Series(name, marker, tuple((float(n), size) for n, size in enumerate(sizes, 1))))
     return PlotView(
-        title="Deviation per held-out pose, mm",
+        title="Held-out deviation, mm",
         x_label="held-out pose",
         series=tuple(series),
         is_logarithmic=True,
@@ -123,7 +159,7 @@ def residual_plot(picture: RunPicture) -> PlotView:
         scaled = [(measured - predicted) / sigma for measured, predicted, sigma in pairs if sigma > 0.0]
         found.append((float(number), max(scaled, key=abs, default=0.0)))
     return PlotView(
-        title="Residual per record, sigma",
+        title="Residual, sigma",
         x_label="record",
         series=(Series("largest of x, y, z", "o", tuple(found)),),
         level=0.0,
@@ -133,8 +169,12 @@ def residual_plot(picture: RunPicture) -> PlotView:
 
 def rollback_question(run: str, *, is_in_controller: bool) -> QuestionView:
     """What a person confirms before the controller's config is changed."""
-    title = f"Go back to the controller's config that {run} wrote?"
+    title = f"Restore the controller's config that {run} wrote?"
+    follows = "The robot then errs as after that run; what drifted since is not corrected."
     if is_in_controller:
         title = f"Undo {run}: restore the previous config of the controller?"
+        follows = "The errors that this run corrected return."
+    reload = "The controller has to read the file anew: restart or reload it then, before anything moves."
     consent = Choice("y", "yes, replace the config, bit for bit", PERSON, is_consent=True)
-    return QuestionView(title, (), "Press y or n.", (consent, Choice("n", "no, leave it as it is", None)))
+    decline = Choice("n", "no, leave it as it is", None)
+    return QuestionView(title, (follows, reload), "Press y or n.", (consent, decline))

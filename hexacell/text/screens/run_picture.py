@@ -6,7 +6,6 @@ from datetime import datetime
 
 from hexacell.campaign.decisions import Forecast
 from hexacell.run_process import messages
-from hexacell.text.screens.views import Urgency
 from procedures.engine.command_loop import Status
 from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import Question
@@ -20,12 +19,6 @@ Setback = events.Tripped | events.Failed | events.Interrupted | messages.HostFai
 
 
 MODES = {"optimise": "calibration", "quick": "quick level", "check": "check", "length": "length check"}
-URGENT = {
-    Status.FAULTED: Urgency.ALARM,
-    Status.AWAITING_OPERATOR: Urgency.ATTENTION,
-    Status.PAUSED: Urgency.ATTENTION,
-    Status.PAUSING: Urgency.ATTENTION,
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +31,7 @@ class RunPicture:
         expected: predicted readings of the gauges, by set and orientation.
         forecasts: predicted errors, each with the number of records for the identification before it.
         setback: the latest fault, until a step is begun after it; ``setbacks`` is the number of faults.
-        refusal: the command that was refused last, until the next event.
+        refusal: the command that was refused last; ``refusals`` is how many were.
         record_times: when records were taken, for the time that is left.
     """
 
@@ -57,6 +50,7 @@ class RunPicture:
     setback: Setback | None = None
     setbacks: int = 0
     refusal: events.CommandRejected | None = None
+    refusals: int = 0
     record_times: tuple[datetime, ...] = ()
 
     @property
@@ -104,7 +98,7 @@ def picture_after(  # noqa: PLR0911 - a case a message
 
 def _with_event(picture: RunPicture, message: messages.EventRecorded) -> RunPicture:
     event = message.event
-    picture = replace(picture, state=apply(picture.state, event), last=event, refusal=None)
+    picture = replace(picture, state=apply(picture.state, event), last=event)
     match event:
         case events.StepBegun(step=step):
             picture = replace(picture, step=step, setback=None)
@@ -119,7 +113,7 @@ def _with_event(picture: RunPicture, message: messages.EventRecorded) -> RunPict
         case events.RecordTaken():
             return replace(picture, record_times=(*picture.record_times, message.at), step=None)
         case events.CommandRejected():
-            return replace(picture, refusal=event)
+            return replace(picture, refusal=event, refusals=picture.refusals + 1)
         case events.Tripped() | events.Failed() | events.Interrupted():
             return replace(_with_setback(picture, event), step=None)
         case _:
@@ -130,21 +124,29 @@ def _with_setback(picture: RunPicture, setback: Setback) -> RunPicture:
     return replace(picture, setback=setback, setbacks=picture.setbacks + 1)
 
 
-def header_line(cell: str, picture: RunPicture) -> tuple[str, str, Urgency]:
-    """The cell and what is done there; its state and who is in control; and how urgent that is."""
+def header_line(cell: str, picture: RunPicture) -> tuple[str, str]:
+    """The cell and what is done there; and who is in control, or where a recorded run stands."""
     described, control = picture.described, picture.control
     if described is None:
-        return f"hexacell | {cell}", "no run", Urgency.CALM
+        return f"hexacell │ {cell}", ""
     activity = MODES[described.mode]
     if described.is_recorded:
-        where = f"hexacell | {cell} | recorded {activity} {described.folder.name}"
+        where = f"hexacell │ {cell} │ recorded {activity} {described.folder.name}"
         if (cursor := picture.cursor) is None:
-            return where, "RECORDED", Urgency.CALM
+            return where, ""
         speed = f"x{cursor.speed:g}" if cursor.speed else "halted"
-        state = f"{cursor.at:%Y-%m-%d %H:%M:%S} {cursor.sequence}/{cursor.last} {speed}"
-        return where, state, Urgency.CALM
-    state = picture.status.value.upper()
+        return where, f"{cursor.at:%Y-%m-%d %H:%M:%S} {cursor.sequence}/{cursor.last} {speed}"
+    who = ""
     if control is not None:
         watching = f"watching, {control.who or 'nobody'} is in control"
-        state += f" | {'you are in control' if control.is_in_control else watching}"
-    return f"hexacell | {cell} | {activity}", state, URGENT.get(picture.status, Urgency.CALM)
+        who = "you are in control" if control.is_in_control else watching
+    return f"hexacell │ {cell} │ {activity}", who
+
+
+WORDS = {"MeasureAgain": "Measuring again", "Undo": "Taking back the last record", "Pause": "Pausing"}
+"""What a refused command would have done, by its name in the journal."""
+
+
+def refusal_text(refusal: events.CommandRejected) -> str:
+    """Why something that was asked for is not done."""
+    return f"{WORDS.get(refusal.command, refusal.command)} is not possible now: {refusal.reason}"

@@ -13,7 +13,7 @@ from hexacell.kinematics.pose import Pose
 from hexacell.services.preflight import toggle_exclusion
 from hexacell.services.run.calibration_run import calibrate
 from hexacell.services.run.replay_run import replay
-from hexacell.text.screens.live import exclusions_text, plan_rows
+from hexacell.text.screens.checklist import exclusions_text, plan_rows
 from procedures.engine.commands import Abort, CommandQueue
 from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase

@@ -3,7 +3,13 @@
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+from hypothesis import given
+from hypothesis import strategies as st
+
 from drivers.interfaces import EncoderSample
+from hexacell.campaign.budget import TimeModel
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.kinematics.pose import Pose
 from hexacell.run_process.messages import (
@@ -17,10 +23,14 @@ from hexacell.run_process.messages import (
     RunDescribed,
     Shown,
 )
-from hexacell.text.screens.live import device_lines, mounting_advice
-from hexacell.text.screens.measuring import fault_view, guidance, record_lines
-from hexacell.text.screens.reviewing import review_texts
+from hexacell.text.screens.banner import cell_banner, preflight_banner, run_banner
+from hexacell.text.screens.devices import device_cards
+from hexacell.text.screens.measuring import fault_view, record_rows
+from hexacell.text.screens.placing import mounting_advice, placing
+from hexacell.text.screens.reviewing import review_lines
 from hexacell.text.screens.run_picture import RunPicture, Setback, picture_after
+from hexacell.text.screens.time_left import remaining
+from hexacell.text.screens.views import ChecklistItem, Mark, Urgency
 from hexacell.verdict.decision import Verdict
 from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import ask_placement
@@ -56,67 +66,122 @@ def recorded(event: events.Event, number: int = 1) -> EventRecorded:
 
 def test_a_gauge_says_how_it_is_to_be_moved() -> None:
     moves: list[tuple[dict[str, object], str]] = [
-        ({"shown_mm": -1.2}, "move the x gauge 1.2 mm in (along -x)"),
-        ({"shown_mm": 1.2}, "move the x gauge 1.2 mm out (along +x)"),
-        ({"shown_mm": 1.2, "sign": -1}, "move the x gauge 1.2 mm out (along -x)"),
-        ({"shown_mm": -1.2, "sign": -1}, "move the x gauge 1.2 mm in (along +x)"),
-        ({"shown_mm": 3.4, "middle_mm": 3.0}, "ok, 0.4 mm from mid travel"),
-        ({"middle_mm": None}, "set the x plunger to mid travel by eye"),
-        ({"shown_mm": None}, "the x gauge does not answer"),
-        ({"problem": "silent"}, "the x gauge does not answer"),
+        ({"shown_mm": -1.2}, "move it 1.2 mm in, along -x"),
+        ({"shown_mm": 1.2}, "move it 1.2 mm out, along +x"),
+        ({"shown_mm": 1.2, "sign": -1}, "move it 1.2 mm out, along -x"),
+        ({"shown_mm": -1.2, "sign": -1}, "move it 1.2 mm in, along +x"),
+        ({"shown_mm": 3.4, "middle_mm": 3.0}, "in place, 0.4 mm from mid travel"),
+        ({"middle_mm": None}, "set it to mid travel by eye"),
+        ({"shown_mm": None}, "it does not answer"),
+        ({"problem": "silent"}, "it does not answer"),
     ]
     assert [mounting_advice(gauge(**changes), 1.0) for changes, _ in moves] == [said for _, said in moves]
+
+
+@given(signs=st.tuples(*[st.sampled_from([1, -1])] * 3), shown=st.tuples(*[st.floats(-6.0, 6.0)] * 3))
+def test_gauges_are_drawn_on_their_sides_and_are_in_place_once_all_of_them_are(
+    signs: tuple[int, int, int], shown: tuple[float, float, float]
+) -> None:
+    gauges = tuple(
+        gauge(name=axis, axis=axis, sign=sign, shown_mm=mm)
+        for axis, sign, mm in zip("xyz", signs, shown, strict=True)
+    )
+    found = placing(LiveSnapshot(gauges=gauges), 1.0)
+    assert found.are_in_place == all(abs(one) <= 1.0 for one in shown)
+    rows = ["".join(text for text, _ in row) for row in found.picture]
+    assert len({len(row) for row in rows}) == 1
+    ball = next((row, line.index("██████")) for row, line in enumerate(rows) if "██████" in line)
+    for axis, sign in zip("xyz", signs, strict=True):
+        name = f"{'+' if sign > 0 else '-'}{axis}"
+        row, column = next((at, line.index(name)) for at, line in enumerate(rows) if name in line)
+        is_there = {"x": column > ball[1], "y": row < ball[0], "z": row < ball[0]}[axis]
+        assert is_there == (sign > 0)
 
 
 def test_a_device_that_is_silent_gets_older_by_itself() -> None:
     snapshot = LiveSnapshot(
         gauges=(gauge(),), encoders=Shown(value=EncoderSample((), (0.0,) * 6), age_s=0.1)
     )
-    assert "0.1 s" in device_lines(snapshot)[0][0]
-    lines = device_lines(snapshot, later_s=7.0)
-    assert "7.1 s" in lines[0][0]
-    assert lines[1][0].endswith("mm, 7.1 s ago")
+    x, encoders, controller, stop = device_cards(snapshot, later_s=7.0)
+    assert (x.state, x.figure) == ("ok", "+0.0000 mm")
+    assert x.lines[-1].endswith("7.1 s ago")
+    assert encoders.lines[-1] == "7.1 s ago"
+    assert (controller.state, stop.state) == ("waiting", "free")
+    silent = device_cards(LiveSnapshot(gauges=(gauge(problem="gauge x: silent"),), stop_reason="open"), 0.0)
+    assert [(one.urgency, one.lines[:1]) for one in (silent[0], silent[-1])] == [
+        (Urgency.ALARM, ("silent",)),
+        (Urgency.ALARM, ("open",)),
+    ]
 
 
-def test_the_time_that_is_left_follows_from_the_pace() -> None:
+def test_the_time_that_is_left_follows_from_the_pace_and_from_people() -> None:
     story = Story(POINT)
     told = [recorded(story.sampled(number), number) for number in range(1, 6)]
     picture = pictured(described(expected_records=25), *told)
-    assert guidance(picture, None)["Time"] == "about 10 minutes: at most 20 of 25 readings are left"
+    assert remaining(picture, None) == "About 10 minutes left: at most 20 of 25 readings"
+    bundled = load_cell(bundled_config("simulated-hexaglide")).settings
+    stations = bundled.stations.model_copy(update={"placement": "by-hand"})
+    settings = bundled.model_copy(update={"stations": stations})
+    by_hand = TimeModel.of(settings).point_minutes
+    visits = len(settings.identification.points) + 2 * len(settings.verification.points)
+    assert by_hand > 0.0
+    minutes = round(10.0 + (visits - 1) * by_hand)
+    assert remaining(picture, settings) == f"About {minutes} minutes left: at most 20 of 25 readings"
 
 
 def test_who_watches_is_told_who_is_in_control() -> None:
     picture = pictured(described(), ControlChanged(is_in_control=False, who="grace"))
-    assert guidance(picture, None)["Stop"] == "you only watch: grace is in control; c takes over"
+    assert run_banner(picture, None).rest == "You only watch: grace is in control; c takes over"
     asked = picture_after(
         picture,
         QuestionChanged(question=ask_placement(SetKey(phase=Phase.LENGTH, point=1), Pose(0.0, 0.0, 0.0))),
         0.0,
     )
-    assert guidance(asked, None)["Now"] == "a question waits for who is in control"
+    banner = run_banner(asked, None)
+    assert (banner.word, banner.urgency) == ("WAITING", Urgency.CALM)
 
 
-def test_a_record_has_its_largest_residual_and_how_many_sigma_that_is() -> None:
+def test_a_question_is_a_persons_turn_with_the_key_that_shows_it() -> None:
+    question = ask_placement(SetKey(phase=Phase.IDENTIFY, point=3), Pose(0.0, 0.0, 0.0))
+    banner = run_banner(pictured(described(), QuestionChanged(question=question)), None)
+    assert banner.word == "YOUR TURN"
+    assert banner.action == "Put the gauges around the ball at point 3: press w"
+
+
+def test_what_is_to_be_mended_comes_before_everything_else() -> None:
+    snapshot = LiveSnapshot(gauges=(gauge(problem="gauge x: silent"),), stop_reason="open")
+    banner = cell_banner(snapshot, "")
+    assert (banner.action, banner.following) == ("Gauge x: silent", "1 more below.")
+    failed = ChecklistItem(Mark.FAILED, "gauge y", "it answers in inch", "Press the in/mm key")
+    ready = ChecklistItem(Mark.DONE, "gauge x")
+    assert preflight_banner((ready, failed), is_checking=False, is_running=False).action == failed.action
+    assert preflight_banner((ready,), is_checking=False, is_running=False).action.startswith("Press s")
+    assert preflight_banner(None, is_checking=False, is_running=False).action.startswith("Press Enter")
+
+
+def test_a_record_has_what_it_is_off_and_how_many_sigma_that_is_and_far_ones_are_marked() -> None:
     story, pose = Story(POINT), (0.0, 0.0, 500.0, 1.0, 0.0, 0.0)
     expected = Expectation(deviation_mm=(0.1, 0.0, 0.0), sigma_mm=(0.05, 0.1, 0.1), gain=1.0)
-    step = Move(at=POINT, orientation=2, pose=pose, expected=expected)
-    picture = pictured(
-        recorded(story.sampled(1)),
-        recorded(events.StepBegun(step=step)),
-        recorded(story.sampled(2, (-0.1, 0.01, 0.02))),
-        recorded(story.sampled(3, (0.0, 0.01, 0.02))),
-    )
-    assert record_lines(picture) == (
-        "2/1           +0.000  +0.000  +0.000      reference",
-        "2/2           -0.100  +0.010  +0.020   -0.200   4.0",
-        "2/3           +0.000  +0.010  +0.020        -     -",
-    )
+    messages: list[HostMessage] = [recorded(story.sampled(1))]
+    for orientation, x in ((2, -0.1), (3, -0.11)):
+        step = Move(at=POINT, orientation=orientation, pose=pose, expected=expected)
+        messages += [
+            recorded(events.StepBegun(step=step)),
+            recorded(story.sampled(orientation, (x, 0.01, 0.02))),
+        ]
+    picture = pictured(*messages, recorded(story.sampled(4, (0.0, 0.01, 0.02))))
+    assert [(row.cells, row.urgency) for row in record_rows(picture)] == [
+        (("2/1", "+0.000", "+0.000", "+0.000", "ref.", ""), Urgency.CALM),
+        (("2/2", "-0.100", "+0.010", "+0.020", "-0.200", "4.0"), Urgency.CALM),
+        (("2/3", "-0.110", "+0.010", "+0.020", "-0.210", "4.2 !"), Urgency.ATTENTION),
+        (("2/4", "+0.000", "+0.010", "+0.020", "", ""), Urgency.CALM),
+    ]
 
 
 def test_going_back_in_a_recorded_run_forgets_what_came_later() -> None:
     told: list[HostMessage] = [described(is_recorded=True), recorded(Story(POINT).sampled(1))]
-    assert record_lines(pictured(*told)) != ()
-    assert record_lines(pictured(*told, described(is_recorded=True))) == ()
+    assert record_rows(pictured(*told)) != ()
+    assert record_rows(pictured(*told, described(is_recorded=True))) == ()
 
 
 def test_a_fault_has_its_cause_and_the_next_action() -> None:
@@ -133,7 +198,7 @@ def test_a_fault_has_its_cause_and_the_next_action() -> None:
             (
                 events.Failed(step=None, failure=kind, attempt=2, reason="why", action=Action.REDO_SET),
                 "A step failed, the robot was stopped",
-                "The run does this now: redo-set (attempt 2).",
+                "Nothing: discard this point and measure it again is under way (attempt 2).",
             )
             for kind in FailureKind
         ),
@@ -148,6 +213,7 @@ def test_a_fault_has_its_cause_and_the_next_action() -> None:
 def test_every_verdict_is_said_in_words_with_its_scope() -> None:
     for verdict in Verdict:
         judged = events.ResultValidated(verdict=verdict, line="what came of it")
-        shown = review_texts(pictured(described(), recorded(judged)), None)
-        assert shown["verdict"].lower().startswith(f"{verdict.value}: ")
-        assert shown["scope"] == "what came of it"
+        said, consequences, scope = review_lines(pictured(described(), recorded(judged)))
+        assert said[0].lower().startswith(f"{verdict.value}: ")
+        assert consequences[0][0].startswith("Approving is not possible yet")
+        assert scope == [("what came of it", Urgency.CALM)]

@@ -150,7 +150,8 @@ def noise_levels(found: Identification) -> NoiseLevels | None:
         )
         for known, variance, error in zip(stated, variances, errors, strict=True)
     )
-    return NoiseLevels(encoder, gauge, float(covariance[0, 1] / (errors[0] * errors[1])))
+    correlation = float(covariance[0, 1] / (errors[0] * errors[1]))
+    return NoiseLevels(encoder, gauge, correlation, found.problem.mechanism.words.joint_unit)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

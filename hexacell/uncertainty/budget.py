@@ -172,6 +172,13 @@ class UncertaintyBudget:
         return _largest(np.concatenate([self.noise, self.systematic], axis=-1))
 
     @property
+    def parts_mm(self) -> tuple[float, ...]:
+        """Parts of ``standard_mm`` at its own task pose: by the noise, then by each line; squares add up."""
+        parts = [self.noise, *(line.columns for line in self.lines)]
+        squares = np.array([(part[:, :3] ** 2).sum(axis=(1, 2)) for part in parts])
+        return tuple(np.sqrt(squares[:, squares.sum(axis=0).argmax()]).tolist())
+
+    @property
     def expanded_mm(self) -> float:
         """U of the largest position error over the task poses, which is estimated as zero."""
         return self._unknown.position.expanded

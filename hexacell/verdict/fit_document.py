@@ -97,7 +97,9 @@ def _budget(budget: UncertaintyBudget, *, is_evident: bool) -> dict[str, Any]:
     figures = {name: getattr(budget, name) for name in ("noise_mm", "systematic_mm", "standard_mm")}
     for name in ("expanded_mm", "expanded_deg"):
         figures[name] = getattr(budget, name) if is_evident else None
-    return figures | {"lines": [*map(_line, budget.lines)]}
+    noise_mm, *parts_mm = budget.parts_mm
+    lines = [_line(line) | {"part_mm": mm} for line, mm in zip(budget.lines, parts_mm, strict=True)]
+    return figures | {"noise_part_mm": noise_mm, "lines": lines}
 
 
 def _line(line: BudgetLine) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import date
 from enum import StrEnum
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
@@ -22,11 +23,16 @@ PDF_STANDARD: Final = "a-2b"
 
 
 class Tone(StrEnum):
-    """How a verdict is coloured."""
+    """How a verdict is coloured, and the sign that says the same without colour."""
 
     GOOD = "good"
     OPEN = "open"
     BAD = "bad"
+
+    @property
+    def sign(self) -> str:
+        """The sign before the verdict."""
+        return {Tone.GOOD: "\u2713", Tone.OPEN: "?", Tone.BAD: "\u2717"}[self]
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,18 +65,35 @@ class Table:
 
     @property
     def widths(self) -> list[str]:
-        """Widths for typst: without numbers, the column with most text takes what the others leave."""
+        """Widths for typst: numbers share what the names leave; without numbers the longest column has it."""
         longest = [max(map(len, column)) for column in zip(self.columns, *self.rows, strict=True)]
-        place = longest.index(max(longest)) if self.numbers_from is None else None
-        return ["1fr" if column == place else "auto" for column in range(len(longest))]
+        longest_one = longest.index(max(longest))
+        wide = {longest_one} if self.numbers_from is None else {*range(self.numbers_from, len(longest))}
+        return ["1fr" if column in wide else "auto" for column in range(len(longest))]
 
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A drawing as SVG text, and what it shows in words, for those who do not see it."""
+    """A drawing as SVG text, and what it shows in words, for those who do not see it.
+
+    ``series`` are the names of parts, in groups ``series-1`` and so on, that can be looked at alone;
+    ``width`` is its share of the page's.
+    """
 
     svg: str
     caption: str
+    series: tuple[str, ...] = ()
+    width: str = "100%"
+
+
+@dataclass(frozen=True, slots=True)
+class Card:
+    """A figure of the first page: its name, the figure with its unit, what it is compared with, a bar."""
+
+    name: str
+    figure: str
+    detail: str
+    svg: str
 
 
 Block = Paragraph | Facts | Table | Picture
@@ -86,14 +109,29 @@ class Chapter:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A report: ``identifier`` is on each page, ``tone`` colours the verdict, but is not its only sign."""
+    """A report, whose first page has all but the chapters.
+
+    Attributes:
+        identifier: is on each page.
+        meaning: the verdict in a sentence.
+        legend: what the bars of the cards show.
+        summary: what follows the cards.
+        is_simulated: whether the robot was; then every page says so.
+        robot_svg: a drawing of the robot; empty without.
+    """
 
     title: str
     identifier: str
     issued: date
     verdict: str
     tone: Tone
+    meaning: str
+    cards: tuple[Card, ...]
+    legend: str
+    summary: tuple[Chapter, ...]
     chapters: tuple[Chapter, ...]
+    is_simulated: bool = False
+    robot_svg: str = ""
 
 
 def rendered(
@@ -150,7 +188,16 @@ def pdf_of(report: Report) -> bytes:
         ) from error
     # Every text is a string literal, never markup.
     markup = rendered("report.typ.j2", _literal, is_markup=False, report=report).encode()
-    return typst.compile(markup, format="pdf", pdf_standards=PDF_STANDARD, ignore_system_fonts=True)
+    return typst.compile(
+        markup, format="pdf", pdf_standards=PDF_STANDARD, ignore_system_fonts=True, font_paths=_fonts()
+    )
+
+
+def _fonts() -> list[str]:
+    """Where DejaVu Sans is, which comes with matplotlib: typst has no sans serif of its own."""
+    found = find_spec("matplotlib")
+    places = (found and found.submodule_search_locations) or ()
+    return [str(Path(place) / "mpl-data" / "fonts" / "ttf") for place in places]
 
 
 def _literal(value: object) -> object:

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 
 from drivers.interfaces import DeviceIdentity
 from hexacell.cell.fields import CertificateSettings
-from hexacell.lengths import shown
+from hexacell.lengths import MM
 from hexacell.services.history.reported_run import ReportedRun
 from hexacell.text.measured_noise import measured_noise_sentences, reversal_sentence, worsening_sentence
 from hexacell.text.report import results, statement
 from hexacell.text.report.pages import Chapter, Facts, Paragraph, Report, Table, Tone
+from hexacell.text.report.statement import NOT_STATED
 from procedures.run.readings import temperatures_shown
 
 TITLES = {
@@ -19,11 +20,11 @@ TITLES = {
     "length": "Report of a length check",
 }
 
-NOT_STATED = "not stated"
 
-
-def report_of(run: ReportedRun, earlier: ReportedRun | None = None) -> Report:
+def report_of(run: ReportedRun, earlier: ReportedRun | None = None, robot_svg: str = "") -> Report:
     """The report of a run, the verdict first; with what has changed since an ``earlier`` run, if named.
+
+    ``robot_svg`` is a drawing of the robot for the first page.
 
     Raises:
         UsageError: the two cannot be compared.
@@ -31,9 +32,7 @@ def report_of(run: ReportedRun, earlier: ReportedRun | None = None) -> Report:
     verdict = run.state.verdict
     chapters = (
         statement.statement_chapter(run),
-        statement.found_and_left_chapter(run),
         statement.method_chapter(run),
-        results.figure_chapter(run),
         results.uncertainty_chapter(run),
         results.parameter_chapter(run),
         results.terms_chapter(run),
@@ -50,8 +49,22 @@ def report_of(run: ReportedRun, earlier: ReportedRun | None = None) -> Report:
         issued=run.ended.date(),
         verdict=statement.NO_VERDICT if verdict is None else verdict.value.upper(),
         tone=Tone.OPEN if verdict is None else statement.TONES.get(verdict, Tone.OPEN),
+        meaning=statement.meaning_of(run),
+        cards=statement.cards_of(run),
+        legend=statement.LEGEND,
+        summary=statement.summary_of(run, _serial_numbers(run)),
         chapters=tuple(chapter for chapter in chapters if chapter is not None),
+        is_simulated=run.settings.simulation is not None,
+        robot_svg=robot_svg,
     )
+
+
+def _serial_numbers(run: ReportedRun) -> str:
+    """Every instrument with its serial number, in a line, and those without one."""
+    named = [(one.device.name.partition(" (")[0], one.serial_number) for one in instruments(run)]
+    stated = [f"{name}: {number}" for name, number in named if number]
+    others = ", ".join(name for name, number in named if not number)
+    return "; ".join([*stated, *([f"{NOT_STATED}: {others}"] if others else [])])
 
 
 def conditions_chapter(run: ReportedRun) -> Chapter:
@@ -70,14 +83,14 @@ def conditions_chapter(run: ReportedRun) -> Chapter:
         worse = "" if found.worsening is None else worsening_sentence(found.worsening)
         reversal = "" if found.reversal is None else reversal_sentence(found.reversal)
         noise += tuple(f"{one[:1].upper()}{one[1:]}." for one in (worse, reversal) if one)
-    columns = ("Set of records", "records", "largest deviation", "drift of the gauges")
+    columns = ("Set of records", "records", "largest deviation, mm", "drift of the gauges, mm")
     # The sets whose reference was read again, with how far the gauges had drifted by then.
     rows = tuple(
         (
             key.name,
             str(len(measured.samples)),
-            shown(max(abs(value) for one in measured.samples for value in one.deviation_mm)),
-            shown(max(map(abs, measured.drift_mm))),
+            MM.number(max(abs(value) for one in measured.samples for value in one.deviation_mm)),
+            MM.number(max(map(abs, measured.drift_mm))),
         )
         for key, measured in state.sets.items()
         if measured.drift_mm is not None and measured.samples
@@ -115,7 +128,7 @@ def integrity_chapter(run: ReportedRun) -> Chapter:
 def authorisation_chapter(run: ReportedRun) -> Chapter:
     """Who answers for it."""
     named = run.settings.report.authorised_by or "not stated in the cell file"
-    pairs = (("Authorised by", named), ("Date and signature", "\u2003" * 20))
+    pairs = (("Authorised by", named), ("Date and signature", "_" * 40))
     text = (
         "This report may be copied as a whole only. Its results are of this robot alone, as it was when it "
         "was measured."

@@ -1,101 +1,64 @@
-"""The results behind the statement: figures, uncertainty budget, parameters, what the records tell apart.
-
-The figures are SVG text that is the same, byte for byte, whenever it is drawn.
-"""
+"""The results behind the statement: uncertainty budget, parameters, residuals, what the records tell apart."""
 
 from collections.abc import Sequence
-
-import numpy as np
+from math import hypot
 
 from hexacell.identification.identified_zeros import ParameterChoice
-from hexacell.kinematics.parameters import LEGS
-from hexacell.lengths import unit_of
+from hexacell.kinematics.parameters import LEGS, JointUnit
+from hexacell.lengths import MM, UM, unit_of
 from hexacell.results.run_comparison import compare_results
 from hexacell.services.history.reported_run import ReportedRun
 from hexacell.services.history.run_summary import require_result
 from hexacell.text.parameters import ParameterRow, rows_of_changes, rows_of_run
 from hexacell.text.planning import quick_accuracy_sentences
-from hexacell.text.report.pages import Chapter, Paragraph, Picture, Table
-from hexacell.text.svg_drawing import AFTER, BEFORE, INK, SMALLEST_MM, as_svg, new_figure
+from hexacell.text.report.charts import Mark, Series, changes
+from hexacell.text.report.pages import Chapter, Facts, Paragraph, Picture, Table
 from hexacell.text.terms import run_terms_text
 from hexacell.uncertainty.statement import COVERAGE_FACTOR
-from procedures.run.keys import Phase
-
-AXES_PLACE = (0.12, 0.17, 0.87, 0.72)
-"""Place of the axes in a figure; to find the best one would draw each figure twice."""
-
-LABELS_PT = 300.0
-"""Height of all labels of parameters side by side; with more of them they are smaller."""
-
-
-def figure_chapter(run: ReportedRun) -> Chapter | None:
-    """The ball's deviations before and after, and how well the records agree; None without records."""
-    pictures = tuple(one for one in (_deviations(run), _changes(run)) if one is not None)
-    return Chapter("Figures", pictures) if pictures else None
-
-
-def _deviations(run: ReportedRun) -> Picture | None:
-    """What the gauges show at each held-out pose, as in figures 8 and 9 of the paper."""
-    found, left = (run.state.held_out(phase) for phase in (Phase.BEFORE, Phase.AFTER))
-    if not found and not left:
-        return None
-    figure, [axes] = new_figure((7.0, 2.8), AXES_PLACE)
-    series = ((found, "as found", BEFORE, "o"), (left, "as left", AFTER, "s"))
-    for deviations, name, colour, marker in series:
-        distances = np.linalg.norm(np.array(deviations, dtype=float).reshape(-1, 3), axis=-1)
-        numbers, shown = np.arange(1, len(distances) + 1), np.maximum(distances, SMALLEST_MM)
-        axes.semilogy(numbers, shown, marker, color=colour, label=name, markersize=5)
-    axes.set_xlabel("held-out pose")
-    axes.set_ylabel("deviation of the ball, mm")
-    axes.grid(visible=True, axis="y", color="#dddddd", linewidth=0.6)
-    axes.legend(frameon=False, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0))
-    return Picture(as_svg(figure), "Distance of the ball from its reference at each held-out pose.")
-
-
-def _changes(run: ReportedRun) -> Picture | None:
-    """The change of each free parameter by its expanded uncertainty."""
-    if run.state.identified is None:
-        return None
-    rows = rows_of_run(run.state, run.settings)
-    figure, [axes] = new_figure((7.0, 2.8), AXES_PLACE)
-    axes.errorbar(
-        np.arange(len(rows)),
-        [one.change / one.unit.like_a_mm for one in rows],
-        yerr=[one.expanded / one.unit.like_a_mm for one in rows],
-        fmt="o",
-        color=AFTER,
-        markersize=3.5,
-        capsize=2,
-    )
-    axes.axhline(0.0, color=INK, linewidth=0.6)
-    names = [one.name for one in rows]
-    axes.set_xticks(np.arange(len(rows)), names, rotation=90, fontsize=min(9.0, LABELS_PT / len(rows)))
-    kinds = run.settings.mechanism.parameters.kinds
-    axes.set_ylabel(f"change, {' or '.join(dict.fromkeys(kind.unit.shown for kind in kinds))}")
-    return Picture(as_svg(figure), "Change of each parameter, with its expanded uncertainty (k = 2).")
 
 
 def uncertainty_chapter(run: ReportedRun) -> Chapter | None:
-    """The budget that U comes from; None without an identification."""
-    if not (budget := run.document.get("uncertainty")):
+    """The budget that U comes from; None without an identification, or from a version without parts."""
+    budget = run.document.get("uncertainty") or {}
+    if "noise_part_mm" not in budget:
         return None
     unit = unit_of(budget["standard_mm"])
-    rows = [("noise of the readings", "", unit.number(budget["noise_mm"]), "measured and stated")]
+    rows = [("noise of the readings", "measured and stated", "", unit.number(budget["noise_part_mm"]))]
     rows += [
-        (
-            line["name"],
-            f"{line['size']:.3g} {line['unit']}",
-            unit.number(line["combined_mm"]),
-            line["source"],
-        )
+        (line["name"], line["source"], f"{line['size']:.3g} {line['unit']}", unit.number(line["part_mm"]))
         for line in budget["lines"]
-        if line["combined_mm"] >= unit.smallest
+        if line["part_mm"] >= unit.smallest
     ]
-    rows.append(("standard uncertainty (root of the squares)", "", unit.number(budget["standard_mm"]), ""))
-    table = Table(("Cause", "size", f"at the worst task pose, {unit.name}", "source"), tuple(rows))
+    small = [line["part_mm"] for line in budget["lines"] if 0.0 < line["part_mm"] < unit.smallest]
+    if small:
+        rows.append((f"{len(small)} smaller ones", "", "", unit.number(hypot(*small))))
+    rows.append(("standard uncertainty u: root of the squares", "", "", unit.number(budget["standard_mm"])))
+    table = Table(("Cause", "source", "size", f"part of u, {unit.name}"), tuple(rows), 2)
     unseen = [line["name"] for line in budget["lines"] if not line["visible"]]
     note = (Paragraph(f"No record shows these: {', '.join(unseen)}."),) if unseen else ()
-    return Chapter("Uncertainty budget of the identified geometry", (table, *note))
+    text = "Each part is one standard deviation at the task pose where all together are largest."
+    return Chapter("Uncertainty budget", (Paragraph(text), table, Paragraph(_expanded(run)), *note))
+
+
+def _expanded(run: ReportedRun) -> str:
+    """How U follows from u, and why it is another one than that of the verdict."""
+    budget, accuracy = run.document["uncertainty"], run.state.accuracy
+    standard, expanded = budget["standard_mm"], budget["expanded_mm"]
+    if expanded is None or not standard:
+        return "No U is stated: the records contradict the model."
+    unit = unit_of(standard)
+    text = (
+        f"U = {unit.length(expanded)} = {expanded / standard:.2f} u: it holds for the largest error of all "
+        "task poses in 95 of 100 cases. That is found by drawing all causes (JCGM 101), and its factor is "
+        "therefore not 2, as for a single figure."
+    )
+    if accuracy is None or accuracy.position.expanded is None:
+        return text
+    stated = unit.length(accuracy.position.expanded)
+    return (
+        f"{text} The first page has U = {stated}: of the geometry as it was written, with what the controller "
+        "corrects, and by the held-out records too, which were taken after this budget."
+    )
 
 
 def parameter_chapter(run: ReportedRun) -> Chapter | None:
@@ -105,11 +68,30 @@ def parameter_chapter(run: ReportedRun) -> Chapter | None:
         columns = ("Parameter", "unit", "change since identified", "U (k = 2)")
         cells = tuple((*_cells(one)[:2], *_cells(one)[4:]) for one in rows)
         return Chapter("Changes of the geometry", (Table(columns, cells, 2),)) if rows else None
+    symbols = tuple((kind.symbol, kind.meaning) for kind in run.settings.mechanism.parameters.kinds)
     text = (
-        "Both geometries are in the frame convention of the mechanism, so that a choice of frames is no "
+        "A number counts the legs, x, y and z are axes: S3x is S of leg 3 along x. U is twice sigma, the "
+        "standard deviation; a change of less than 3 sigma may be chance. Both geometries are in the frame convention of the mechanism, so that a choice of frames is no "
         "change; the controller's config has the new one in the frames in which the task poses move least."
     )
-    return Chapter("Identified geometry", (_parameter_table(rows, "old", "new"), Paragraph(text)))
+    table = _parameter_table(rows, "old", "new")
+    return Chapter("Identified geometry", (Facts(symbols), Paragraph(text), table, _changes(run, rows)))
+
+
+def _changes(run: ReportedRun, rows: Sequence[ParameterRow]) -> Picture:
+    """The change of each free parameter by its expanded uncertainty."""
+    marks = tuple(
+        Mark(
+            one.change / one.unit.like_a_mm,
+            f"{one.label}: {one.figure(one.old)} to {one.figure(one.new)}, {one.meaning}",
+            one.expanded / one.unit.like_a_mm,
+        )
+        for one in rows
+    )
+    kinds = run.settings.mechanism.parameters.kinds
+    title = f"change, {' or '.join(dict.fromkeys(kind.unit.shown for kind in kinds))}"
+    caption = "Change of each parameter; a line through a mark is its expanded uncertainty (k = 2)."
+    return changes(Series("changes", marks), tuple(one.name for one in rows), title, caption)
 
 
 def terms_chapter(run: ReportedRun) -> Chapter | None:
@@ -159,7 +141,6 @@ def observability_chapter(run: ReportedRun) -> Chapter | None:
     if run.state.identified is None:
         return None
     result, quick = run.state.identified.result, run.state.identified.quick
-    expected = result.residuals.expected
     left_out = ", ".join(f"P{one.point}/{one.orientation} ({one.kind.value})" for one in result.outliers)
     sentences = [f"{result.records} records at {result.points} points."]
     if result.identifies is not ParameterChoice.ALL:
@@ -168,7 +149,10 @@ def observability_chapter(run: ReportedRun) -> Chapter | None:
             "tolerances are its uncertainty."
         )
     sentences += [
-        f"Residuals {1e3 * result.residual_rms_mm:.1f} um (rms), chi2 {result.chi2:.1f} of {expected:.0f}.",
+        f"At the ball the residuals are {UM.number(result.residual_rms_mm)} um (rms), "
+        f"{result.residuals.ratio:.2f} times what the noise counted with explains there, enlarged by the "
+        f"legs. In units of that noise their squares add up to chi2 = {result.chi2:.1f}; "
+        f"{result.residuals.expected:.0f} is expected.",
         *([] if quick is None else [quick_accuracy_sentences(quick)]),
         f"Parameters that the records do not determine: {', '.join(result.undetermined) or 'none'}.",
         f"Records left out as false: {left_out or 'none'}.",
@@ -176,4 +160,21 @@ def observability_chapter(run: ReportedRun) -> Chapter | None:
     pairs = run.document.get("correlated") or []
     rows = tuple((" and ".join(pair["parameters"]), f"{pair['correlation']:+.2f}") for pair in pairs[:10])
     tables = (Table(("Strongly correlated parameters", "correlation"), rows),) if rows else ()
-    return Chapter("Observability", (*map(Paragraph, sentences), *tables))
+    return Chapter("Records and residuals", (*map(Paragraph, sentences), *_noise_table(run), *tables))
+
+
+def _noise_table(run: ReportedRun) -> tuple[Table, ...]:
+    """The noise that was counted with beside that in the residuals, in one unit; empty if that is unknown."""
+    noise, rows = run.document.get("noise") or {}, []
+    for key, level in noise.items():
+        if not isinstance(level, dict) or not noise["told_apart"]:
+            continue
+        instrument, _, name = key.partition("_")
+        unit = JointUnit(name)
+        stated, found, error, most = (
+            f"{1e3 * level[one]:.2f}" for one in ("stated", "estimated", "standard_error", "at_most")
+        )
+        estimate = f"{found} +- {error}" if level["seen"] else f"below {most}"
+        rows.append((f"{instrument}, {unit.thousandth}", stated, estimate))
+    columns = ("Noise of a record, one sigma", "counted with", "found in the residuals")
+    return (Table(columns, tuple(rows)),) if rows else ()

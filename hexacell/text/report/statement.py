@@ -1,19 +1,31 @@
-"""The first page of a report: the statement of conformity, its scope and rule, as found and as left.
+"""The first page of a report, and the statement of conformity that it gives in short: rule and evidence.
 
 In the order and words of ISO/IEC 17025:2017, 7.8, where they apply.
 """
 
 from collections.abc import Iterator
+from itertools import count
+from math import hypot
 
-from hexacell.lengths import unit_of
+from hexacell.lengths import MM, unit_of
 from hexacell.services.history.reported_run import ReportedRun
-from hexacell.text.report.pages import Block, Chapter, Facts, Paragraph, Table, Tone
+from hexacell.text.parameters import rows_of_run
+from hexacell.text.report.charts import Mark, Series, distances, error_bar
+from hexacell.text.report.pages import TEMPLATES, Card, Chapter, Facts, Paragraph, Picture, Table, Tone
+from hexacell.text.terms import found_sentence
 from hexacell.text.verdict import VERDICT_MEANINGS, not_checked, scale_lines, teaching_sentence
-from hexacell.uncertainty.statement import COVERAGE_FACTOR
 from hexacell.verdict.decision import Verdict, VerifiedAccuracy
+from hexacell.verdict.model_evidence import ModelTest
 from procedures.run.keys import Phase
 
 NO_VERDICT = "NOT EVALUATED"
+
+NOT_STATED = "not stated"
+
+LEGEND = (
+    "Blue: the error. Black: its expanded uncertainty U, within which it is in 95 of 100 cases. Light blue: "
+    "the error with the guard band of the decision rule. Red: the limit."
+)
 
 TONES = {Verdict.PASS: Tone.GOOD, Verdict.FAIL: Tone.BAD}
 """Colours of the verdicts; all others are open."""
@@ -35,66 +47,123 @@ MODELS = {
 """What distinguishes the method of each kind of work."""
 
 
-def statement_chapter(run: ReportedRun) -> Chapter:
-    """The verdict, the errors that it is on, its reasons, scope and rule."""
-    judged, verdict, accuracy = run.state.judged, run.state.verdict, run.state.accuracy
-    meaning = "The run ended before anything could be said of the robot."
-    if verdict is not None:
-        is_of_length = judged is not None and judged.length is not None
-        meaning = f"{'Of the length scale alone: ' if is_of_length else ''}{VERDICT_MEANINGS[verdict]}"
+def meaning_of(run: ReportedRun) -> str:
+    """The verdict in a sentence."""
+    judged, verdict = run.state.judged, run.state.verdict
+    if judged is None or verdict is None:
+        return "The run ended before anything could be said of the robot."
+    return f"{'Of the length scale alone: ' if judged.length else ''}{VERDICT_MEANINGS[verdict]}"
+
+
+def cards_of(run: ReportedRun) -> tuple[Card, ...]:
+    """The errors that the verdict is on, each with U and its limit."""
+    judged, accuracy = run.state.judged, run.state.accuracy
     errors = () if accuracy is None else accuracy.errors
-    rows = tuple(
-        (
-            f"{name}, {shown.name}",
-            shown.number(one.value),
-            "not stated" if one.expanded is None else shown.number(one.expanded),
-            shown.limit(one.limit),
-            one.verdict.value,
+    if judged is not None and judged.length is not None and judged.length.error is not None:
+        errors = (("position", "mm", judged.length.error),)
+    return tuple(
+        Card(
+            f"Largest {name} error at the task",
+            shown.length(one.value),
+            f"U {'not stated' if one.expanded is None else shown.length(one.expanded)}, "
+            f"limit {shown.limit(one.limit)} {shown.name}: {one.verdict}",
+            error_bar(one, unit),
         )
         for name, unit, one in errors
         for shown in [one.shown_in(unit)]
     )
-    title = "" if accuracy is None else f"Largest error, one round of {accuracy.poses} task poses"
-    blocks: list[Block] = [
-        Paragraph(meaning, is_strong=True),
-        *([Table((title, "error", "U (k = 2)", "limit", "verdict"), rows)] if rows else []),
-        _reasons(run),
-        Paragraph(scope_sentences(accuracy)),
-        Paragraph(decision_rule(accuracy)),
-    ]
-    return Chapter("Statement of conformity", tuple(blocks))
 
 
-def found_and_left_chapter(run: ReportedRun) -> Chapter:
-    """Errors as found and as left, and what must be taught anew."""
-    state = run.state
+def summary_of(run: ReportedRun, serial_numbers: str) -> tuple[Chapter, ...]:
+    """What follows the errors on the first page: before and after, what was corrected, for what it holds."""
+    state, report = run.state, run.settings.report
     moved = None if state.proposed is None else state.proposed.displacement
     rows = tuple(_found_and_left_rows(run))
     table = (Table(("", "as found", "as left"), rows),) if rows else ()
     is_written = state.committed is not None and not state.rolled_back
-    teaching = (Paragraph(teaching_sentence(moved)),) if moved and is_written else ()
-    return Chapter("As found and as left", (*table, Paragraph(_left(run)), *teaching))
+    left = [_left(run), _changed(run), *([teaching_sentence(moved)] if moved and is_written else [])]
+    facts = (
+        ("Robot", report.machine or run.settings.mechanism.words.machine),
+        ("Serial number", report.serial_number or NOT_STATED),
+        ("Cell", f"{run.settings.name}, {run.settings.robot.mechanism}"),
+        ("Run", run.name),
+        ("Begun (UTC)", f"{run.began:%Y-%m-%d %H:%M}"),
+        ("Ended (UTC)", f"{run.ended:%Y-%m-%d %H:%M}"),
+        ("Place", report.place or NOT_STATED),
+        ("Customer", report.customer or NOT_STATED),
+        ("Laboratory", report.laboratory or NOT_STATED),
+        ("Software", run.started.software),
+    )
+    chapters = (
+        Chapter("Outcome", _outcome(run)),
+        Chapter("As found and as left", (*table, *_deviations(run))),
+        Chapter("What was corrected", (Paragraph(" ".join(filter(None, left))),)),
+        Chapter("What it holds for", (Paragraph(scope_sentences(state.accuracy)),)),
+        Chapter("Subject", (Facts(facts), Facts((("Instruments", serial_numbers),)))),
+    )
+    return tuple(chapter for chapter in chapters if chapter.blocks)
+
+
+def _deviations(run: ReportedRun) -> tuple[Picture, ...]:
+    """What the gauges show at each held-out pose, as in figures 8 and 9 of the paper; empty without."""
+    phases = ((Phase.BEFORE, "as found"), (Phase.AFTER, "as left"))
+    series = tuple(
+        Series(name, tuple(map(_deviation, count(1), held_out)), is_before=phase is Phase.BEFORE)
+        for phase, name in phases
+        if (held_out := run.state.held_out(phase))
+    )
+    caption = "Distance of the ball from its reference at each held-out pose, as the gauges measured it."
+    return (distances(series, "deviation, mm", caption),) if series else ()
+
+
+def _deviation(number: int, deviation: tuple[float, float, float]) -> Mark:
+    x, y, z = (f"{axis} {MM.number(mm, '+')}" for axis, mm in zip("xyz", deviation, strict=True))
+    size = hypot(*deviation)
+    return Mark(size, f"Held-out pose {number}: {MM.length(size)} ({x}, {y}, {z})")
+
+
+def _changed(run: ReportedRun) -> str:
+    """What was corrected, or would be, the largest change by name; empty where nothing was identified."""
+    rows = [one for one in rows_of_run(run.state, run.settings) if not one.doubt]
+    if run.state.identified is None or not rows:
+        return ""
+    most = max(rows, key=lambda one: abs(one.change) / one.unit.like_a_mm)
+    changed = sum(one.is_significant for one in rows)
+    kinds = {one.name: one.kind for one in run.settings.mechanism.parameters.parameters}
+    sentence = (
+        f"{changed} of {len(rows)} numbers of the geometry changed by more than chance, most {most.name} "
+        f"({kinds[most.name].meaning.partition(',')[0]}): from {most.figure(most.old)} to "
+        f"{most.figure(most.new)} {most.unit.shown}."
+    )
+    return f"{sentence} {found_sentence(run.state.found_terms)}".strip()
+
+
+def statement_chapter(run: ReportedRun) -> Chapter:
+    """The rule of the verdict, and the tests of the model that it rests on."""
+    rows = [(test.name, f"{'holds' if test.passed else 'FAILS'}: {test.sentence}") for test in _tests(run)]
+    table = (Table(("Test of the model", "result"), tuple(rows), None),) if rows else ()
+    return Chapter("Statement of conformity", (Paragraph(decision_rule(run.state.accuracy)), *table))
+
+
+def _tests(run: ReportedRun) -> tuple[ModelTest, ...]:
+    judged = run.state.judged
+    return () if judged is None or judged.verification is None else judged.verification.tests
 
 
 def method_chapter(run: ReportedRun) -> Chapter:
-    """How it was done, by what, for whom."""
-    report, started = run.settings.report, run.started
-    stated = (
-        ("Laboratory", report.laboratory),
-        ("Customer", report.customer),
-        ("Place", report.place),
-        ("Robot", report.machine),
-        ("Serial number", report.serial_number),
-    )
-    facts = (
-        *((name, value or "not stated in the cell file") for name, value in stated),
-        ("Cell", f"{run.settings.name}, {run.settings.robot.mechanism}"),
-        ("Controller's config", started.config),
-        ("Kind of work", MODES[started.mode]),
-        ("Begun, ended (UTC)", f"{run.began:%Y-%m-%d %H:%M}, {run.ended:%Y-%m-%d %H:%M}"),
-        ("Software", started.software),
-    )
-    return Chapter("Subject and method", (Facts(facts), Paragraph(method_sentences(run))))
+    """How it was done, with what at the ball."""
+    signs = ", ".join(f"{one.name} {one.sign:+d}" for one in run.settings.gauges)
+    caption = f"The gauges at the ball, axes and signs. Signs of this cell: {signs}."
+    facts = (("Kind of work", MODES[run.started.mode]), ("Controller's config", run.started.config))
+    blocks = (Paragraph(method_sentences(run)), Facts(facts), Picture(_gauges_svg(), caption, width="46%"))
+    return Chapter("How it was measured", blocks)
+
+
+def _gauges_svg() -> str:
+    """The part of the drawing of the documentation that shows the gauges."""
+    packaged = TEMPLATES / "gauges.svg"
+    path = packaged if packaged.is_file() else TEMPLATES.parents[2] / "docs" / "gauges.svg"
+    return path.read_text(encoding="utf-8").replace('viewBox="0 0 1000 560"', 'viewBox="540 10 460 540"')
 
 
 def method_sentences(run: ReportedRun) -> str:
@@ -107,18 +176,12 @@ def method_sentences(run: ReportedRun) -> str:
     )
 
 
-def _reasons(run: ReportedRun) -> Block:
-    """The tests of the model, or the outcome of a check or a length check."""
-    if (judged := run.state.judged) is None:
-        reason = "it is not over" if run.state.ended is None else run.state.ended.line
-        return Paragraph(f"How it ended: {reason}.")
-    if judged.verification is not None and judged.verification.tests:
-        rows = (
-            (test.name, f"{'holds' if test.passed else 'FAILS'}: {test.sentence}")
-            for test in judged.verification.tests
-        )
-        return Table(("Test of the model", "result"), tuple(rows), None)
-    return Paragraph(judged.line)
+def _outcome(run: ReportedRun) -> tuple[Paragraph, ...]:
+    """What a check or a length check found, or how a run without verdict ended; empty for others."""
+    if (judged := run.state.judged) is not None:
+        return () if _tests(run) else (Paragraph(judged.line),)
+    reason = "it is not over" if run.state.ended is None else run.state.ended.line
+    return (Paragraph(f"How it ended: {reason}."),)
 
 
 def scope_sentences(accuracy: VerifiedAccuracy | None) -> str:
@@ -142,13 +205,13 @@ def decision_rule(accuracy: VerifiedAccuracy | None) -> str:
         f"Decision rule: pass if error + {band} is at most the limit, fail if error - {band} is above it, "
         "conditional in between (guard band as in ILAC-G8). The error is the largest in one round of "
         "visits to all task poses, and U its expanded uncertainty, which holds in 95 of 100 cases "
-        f"(k = {COVERAGE_FACTOR:g}), and is not stated where the records contradict the model. In the "
+        "(drawn as in JCGM 101), and is not stated where the records contradict the model. In the "
         "terms of ISO 9283 the error has pose accuracy and pose repeatability together, "
         "the latter as far as it was stated or measured."
     )
 
 
-def _found_and_left_rows(run: ReportedRun) -> Iterator[tuple[str, str, str]]:
+def _found_and_left_rows(run: ReportedRun) -> Iterator[tuple[str, ...]]:
     verified = run.state.judged and run.state.judged.verification
     if verified and verified.before_mm is not None:
         poses = len(run.state.held_out(Phase.AFTER))
@@ -161,7 +224,7 @@ def _found_and_left_rows(run: ReportedRun) -> Iterator[tuple[str, str, str]]:
         yield _before_after(name, identified.improvement.now_mm, after)
 
 
-def _before_after(name: str, before_mm: float, after_mm: float | None) -> tuple[str, str, str]:
+def _before_after(name: str, before_mm: float, after_mm: float | None) -> tuple[str, ...]:
     """A row of a length before and after, in the unit of the smaller one."""
     unit = unit_of(before_mm if after_mm is None else after_mm)
     left = "-" if after_mm is None else unit.number(after_mm)

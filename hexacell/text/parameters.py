@@ -52,17 +52,12 @@ class ParameterRow:
         return COVERAGE_FACTOR * self.sigma
 
     @property
-    def is_significant(self) -> bool:
-        """Whether the change is more than chance."""
-        return abs(self.change) >= SIGNIFICANT_SIGMAS * self.sigma
-
-    @property
     def meaning(self) -> str:
         """Whether the change is more than chance, in words."""
         times = abs(self.change) / self.sigma
         if self.doubt:
             return self.doubt
-        word = "changed" if self.is_significant else "unchanged"
+        word = "unchanged" if times < SIGNIFICANT_SIGMAS else "changed"
         return f"{word} ({times:.{1 if times < 99.95 else 0}f} sigma)"
 
     @property

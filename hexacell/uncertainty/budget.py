@@ -173,7 +173,7 @@ class UncertaintyBudget:
 
     @property
     def parts_mm(self) -> tuple[float, ...]:
-        """Parts of ``standard_mm`` at its own task pose: by the noise, then by each line; squares add up."""
+        """Parts of ``standard_mm`` at its task pose, whose squares add up: by noise, then by each line."""
         parts = [self.noise, *(line.columns for line in self.lines)]
         squares = np.array([(part[:, :3] ** 2).sum(axis=(1, 2)) for part in parts])
         return tuple(np.sqrt(squares[:, squares.sum(axis=0).argmax()]).tolist())

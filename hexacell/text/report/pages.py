@@ -65,11 +65,11 @@ class Table:
 
     @property
     def widths(self) -> list[str]:
-        """Widths for typst: numbers share what the names leave; without numbers the longest column has it."""
+        """Widths for typst: by the longest texts; without numbers the longest column takes what is left."""
         longest = [max(map(len, column)) for column in zip(self.columns, *self.rows, strict=True)]
-        longest_one = longest.index(max(longest))
-        wide = {longest_one} if self.numbers_from is None else {*range(self.numbers_from, len(longest))}
-        return ["1fr" if column in wide else "auto" for column in range(len(longest))]
+        if self.numbers_from is not None:
+            return [f"{size + 2}fr" for size in longest]
+        return ["1fr" if size == max(longest) else "auto" for size in longest]
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,16 +84,6 @@ class Picture:
     caption: str
     series: tuple[str, ...] = ()
     width: str = "100%"
-
-
-@dataclass(frozen=True, slots=True)
-class Card:
-    """A figure of the first page: its name, the figure with its unit, what it is compared with, a bar."""
-
-    name: str
-    figure: str
-    detail: str
-    svg: str
 
 
 Block = Paragraph | Facts | Table | Picture
@@ -114,7 +104,7 @@ class Report:
     Attributes:
         identifier: is on each page.
         meaning: the verdict in a sentence.
-        legend: what the bars of the cards show.
+        cards: the errors with their limits.
         summary: what follows the cards.
         is_simulated: whether the robot was; then every page says so.
         robot_svg: a drawing of the robot; empty without.
@@ -126,8 +116,7 @@ class Report:
     verdict: str
     tone: Tone
     meaning: str
-    cards: tuple[Card, ...]
-    legend: str
+    cards: tuple[Picture, ...]
     summary: tuple[Chapter, ...]
     chapters: tuple[Chapter, ...]
     is_simulated: bool = False
@@ -188,9 +177,8 @@ def pdf_of(report: Report) -> bytes:
         ) from error
     # Every text is a string literal, never markup.
     markup = rendered("report.typ.j2", _literal, is_markup=False, report=report).encode()
-    return typst.compile(
-        markup, format="pdf", pdf_standards=PDF_STANDARD, ignore_system_fonts=True, font_paths=_fonts()
-    )
+    fonts = typst.Fonts(include_system_fonts=False, font_paths=_fonts())
+    return typst.compile(markup, format="pdf", pdf_standards=PDF_STANDARD, font_paths=fonts)
 
 
 def _fonts() -> list[str]:

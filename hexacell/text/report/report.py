@@ -51,7 +51,6 @@ def report_of(run: ReportedRun, earlier: ReportedRun | None = None, robot_svg: s
         tone=Tone.OPEN if verdict is None else statement.TONES.get(verdict, Tone.OPEN),
         meaning=statement.meaning_of(run),
         cards=statement.cards_of(run),
-        legend=statement.LEGEND,
         summary=statement.summary_of(run, _serial_numbers(run)),
         chapters=tuple(chapter for chapter in chapters if chapter is not None),
         is_simulated=run.settings.simulation is not None,

@@ -1,17 +1,17 @@
-"""The results behind the statement: uncertainty budget, parameters, residuals, what the records tell apart."""
+"""The results behind the statement: uncertainty budget, parameters, residuals, correlations."""
 
 from collections.abc import Sequence
 from math import hypot
 
 from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.kinematics.parameters import LEGS, JointUnit
-from hexacell.lengths import MM, UM, unit_of
+from hexacell.lengths import UM, unit_of
 from hexacell.results.run_comparison import compare_results
 from hexacell.services.history.reported_run import ReportedRun
 from hexacell.services.history.run_summary import require_result
 from hexacell.text.parameters import ParameterRow, rows_of_changes, rows_of_run
 from hexacell.text.planning import quick_accuracy_sentences
-from hexacell.text.report.charts import Mark, Series, changes
+from hexacell.text.report.charts import Mark, chart
 from hexacell.text.report.pages import Chapter, Facts, Paragraph, Picture, Table
 from hexacell.text.terms import run_terms_text
 from hexacell.uncertainty.statement import COVERAGE_FACTOR
@@ -56,8 +56,8 @@ def _expanded(run: ReportedRun) -> str:
         return text
     stated = unit.length(accuracy.position.expanded)
     return (
-        f"{text} The first page has U = {stated}: of the geometry as it was written, with what the controller "
-        "corrects, and by the held-out records too, which were taken after this budget."
+        f"{text} The first page has U = {stated}: of the geometry as it was written, with what the "
+        "controller corrects, and by the held-out records too, which were taken after this budget."
     )
 
 
@@ -70,28 +70,30 @@ def parameter_chapter(run: ReportedRun) -> Chapter | None:
         return Chapter("Changes of the geometry", (Table(columns, cells, 2),)) if rows else None
     symbols = tuple((kind.symbol, kind.meaning) for kind in run.settings.mechanism.parameters.kinds)
     text = (
-        "A number counts the legs, x, y and z are axes: S3x is S of leg 3 along x. U is twice sigma, the "
-        "standard deviation; a change of less than 3 sigma may be chance. Both geometries are in the frame convention of the mechanism, so that a choice of frames is no "
-        "change; the controller's config has the new one in the frames in which the task poses move least."
+        "A number in a name is that of the leg, a letter after it a coordinate. U is twice sigma, the "
+        "standard deviation; a change of less than 3 sigma may be chance. Both geometries are in the frame "
+        "convention of the mechanism, so that a choice of frames is no change; the controller's config has "
+        "the new one in the frames in which the task poses move least."
     )
     table = _parameter_table(rows, "old", "new")
-    return Chapter("Identified geometry", (Facts(symbols), Paragraph(text), table, _changes(run, rows)))
+    return Chapter("Identified geometry", (Facts(symbols), Paragraph(text), table, _changes(rows)))
 
 
-def _changes(run: ReportedRun, rows: Sequence[ParameterRow]) -> Picture:
+def _changes(rows: Sequence[ParameterRow]) -> Picture:
     """The change of each free parameter by its expanded uncertainty."""
-    marks = tuple(
+    units = " or ".join(dict.fromkeys(one.unit.shown for one in rows))
+    marks = [
         Mark(
             one.change / one.unit.like_a_mm,
             f"{one.label}: {one.figure(one.old)} to {one.figure(one.new)}, {one.meaning}",
             one.expanded / one.unit.like_a_mm,
         )
         for one in rows
+    ]
+    caption = (
+        f"Change of each parameter, {units}; a line through a mark is its expanded uncertainty (k = 2)."
     )
-    kinds = run.settings.mechanism.parameters.kinds
-    title = f"change, {' or '.join(dict.fromkeys(kind.unit.shown for kind in kinds))}"
-    caption = "Change of each parameter; a line through a mark is its expanded uncertainty (k = 2)."
-    return changes(Series("changes", marks), tuple(one.name for one in rows), title, caption)
+    return chart({"change": marks}, [one.name for one in rows], caption)
 
 
 def terms_chapter(run: ReportedRun) -> Chapter | None:
@@ -148,11 +150,14 @@ def observability_chapter(run: ReportedRun) -> Chapter | None:
             "The encoders' zeros alone are identified. All else is as the controller had it, and its "
             "tolerances are its uncertainty."
         )
-    sentences += [
+    residuals = (
         f"At the ball the residuals are {UM.number(result.residual_rms_mm)} um (rms), "
         f"{result.residuals.ratio:.2f} times what the noise counted with explains there, enlarged by the "
         f"legs. In units of that noise their squares add up to chi2 = {result.chi2:.1f}; "
-        f"{result.residuals.expected:.0f} is expected.",
+        f"{result.residuals.expected:.0f} is expected."
+    )
+    sentences += [
+        residuals,
         *([] if quick is None else [quick_accuracy_sentences(quick)]),
         f"Parameters that the records do not determine: {', '.join(result.undetermined) or 'none'}.",
         f"Records left out as false: {left_out or 'none'}.",
@@ -164,7 +169,7 @@ def observability_chapter(run: ReportedRun) -> Chapter | None:
 
 
 def _noise_table(run: ReportedRun) -> tuple[Table, ...]:
-    """The noise that was counted with beside that in the residuals, in one unit; empty if that is unknown."""
+    """The noise that was counted with beside that in the residuals, in one unit; empty if not known."""
     noise, rows = run.document.get("noise") or {}, []
     for key, level in noise.items():
         if not isinstance(level, dict) or not noise["told_apart"]:

@@ -10,8 +10,8 @@ from math import hypot
 from hexacell.lengths import MM, unit_of
 from hexacell.services.history.reported_run import ReportedRun
 from hexacell.text.parameters import rows_of_run
-from hexacell.text.report.charts import Mark, Series, distances, error_bar
-from hexacell.text.report.pages import TEMPLATES, Card, Chapter, Facts, Paragraph, Picture, Table, Tone
+from hexacell.text.report.charts import Mark, chart, error_card
+from hexacell.text.report.pages import TEMPLATES, Chapter, Facts, Paragraph, Picture, Table, Tone
 from hexacell.text.terms import found_sentence
 from hexacell.text.verdict import VERDICT_MEANINGS, not_checked, scale_lines, teaching_sentence
 from hexacell.verdict.decision import Verdict, VerifiedAccuracy
@@ -21,11 +21,6 @@ from procedures.run.keys import Phase
 NO_VERDICT = "NOT EVALUATED"
 
 NOT_STATED = "not stated"
-
-LEGEND = (
-    "Blue: the error. Black: its expanded uncertainty U, within which it is in 95 of 100 cases. Light blue: "
-    "the error with the guard band of the decision rule. Red: the limit."
-)
 
 TONES = {Verdict.PASS: Tone.GOOD, Verdict.FAIL: Tone.BAD}
 """Colours of the verdicts; all others are open."""
@@ -55,27 +50,17 @@ def meaning_of(run: ReportedRun) -> str:
     return f"{'Of the length scale alone: ' if judged.length else ''}{VERDICT_MEANINGS[verdict]}"
 
 
-def cards_of(run: ReportedRun) -> tuple[Card, ...]:
+def cards_of(run: ReportedRun) -> tuple[Picture, ...]:
     """The errors that the verdict is on, each with U and its limit."""
     judged, accuracy = run.state.judged, run.state.accuracy
     errors = () if accuracy is None else accuracy.errors
     if judged is not None and judged.length is not None and judged.length.error is not None:
         errors = (("position", "mm", judged.length.error),)
-    return tuple(
-        Card(
-            f"Largest {name} error at the task",
-            shown.length(one.value),
-            f"U {'not stated' if one.expanded is None else shown.length(one.expanded)}, "
-            f"limit {shown.limit(one.limit)} {shown.name}: {one.verdict}",
-            error_bar(one, unit),
-        )
-        for name, unit, one in errors
-        for shown in [one.shown_in(unit)]
-    )
+    return tuple(error_card(f"Largest {name} error at the task", one, unit) for name, unit, one in errors)
 
 
 def summary_of(run: ReportedRun, serial_numbers: str) -> tuple[Chapter, ...]:
-    """What follows the errors on the first page: before and after, what was corrected, for what it holds."""
+    """What follows the errors on the first page: before and after, what was corrected, the scope."""
     state, report = run.state, run.settings.report
     moved = None if state.proposed is None else state.proposed.displacement
     rows = tuple(_found_and_left_rows(run))
@@ -106,36 +91,34 @@ def summary_of(run: ReportedRun, serial_numbers: str) -> tuple[Chapter, ...]:
 
 def _deviations(run: ReportedRun) -> tuple[Picture, ...]:
     """What the gauges show at each held-out pose, as in figures 8 and 9 of the paper; empty without."""
-    phases = ((Phase.BEFORE, "as found"), (Phase.AFTER, "as left"))
-    series = tuple(
-        Series(name, tuple(map(_deviation, count(1), held_out)), is_before=phase is Phase.BEFORE)
-        for phase, name in phases
-        if (held_out := run.state.held_out(phase))
+    phases = {"as found": Phase.BEFORE, "as left": Phase.AFTER}
+    held_out = {name: run.state.held_out(phase) for name, phase in phases.items()}
+    series = {name: [*map(_mark, count(1), found)] for name, found in held_out.items() if found}
+    names = [str(number + 1) for number in range(max(map(len, held_out.values())))]
+    caption = (
+        "Distance of the ball from its reference at each held-out pose, mm, as the gauges measured it."
     )
-    caption = "Distance of the ball from its reference at each held-out pose, as the gauges measured it."
-    return (distances(series, "deviation, mm", caption),) if series else ()
+    return (chart(series, names, caption, by_decades=True),) if series else ()
 
 
-def _deviation(number: int, deviation: tuple[float, float, float]) -> Mark:
+def _mark(number: int, deviation: tuple[float, float, float]) -> Mark:
     x, y, z = (f"{axis} {MM.number(mm, '+')}" for axis, mm in zip("xyz", deviation, strict=True))
     size = hypot(*deviation)
     return Mark(size, f"Held-out pose {number}: {MM.length(size)} ({x}, {y}, {z})")
 
 
 def _changed(run: ReportedRun) -> str:
-    """What was corrected, or would be, the largest change by name; empty where nothing was identified."""
+    """The largest change of the geometry by name, and what else was found; empty without identification."""
     rows = [one for one in rows_of_run(run.state, run.settings) if not one.doubt]
     if run.state.identified is None or not rows:
         return ""
     most = max(rows, key=lambda one: abs(one.change) / one.unit.like_a_mm)
-    changed = sum(one.is_significant for one in rows)
-    kinds = {one.name: one.kind for one in run.settings.mechanism.parameters.parameters}
-    sentence = (
-        f"{changed} of {len(rows)} numbers of the geometry changed by more than chance, most {most.name} "
-        f"({kinds[most.name].meaning.partition(',')[0]}): from {most.figure(most.old)} to "
-        f"{most.figure(most.new)} {most.unit.shown}."
-    )
-    return f"{sentence} {found_sentence(run.state.found_terms)}".strip()
+    [parameter] = (one for one in run.settings.mechanism.parameters.parameters if one.name == most.name)
+    return (
+        f"Largest of {len(rows)} changes: {most.name} ({parameter.kind.meaning.partition(',')[0]}) from "
+        f"{most.figure(most.old)} to {most.figure(most.new)} {most.unit.shown}. "
+        f"{found_sentence(run.state.found_terms)}"
+    ).strip()
 
 
 def statement_chapter(run: ReportedRun) -> Chapter:

@@ -5,23 +5,26 @@ import json
 import re
 from collections.abc import Callable
 from html import unescape
+from math import hypot
 from pathlib import Path
 from typing import Any
 
-from hexacell.lengths import shown
+import pytest
+
 from procedures.journal.journal import encode, read_entries
+from procedures.run.keys import Phase
 from procedures.steps import events
 from tests.mutations.journals import with_checksum
 
 CHAPTERS = [
-    "Statement of conformity", "As found and as left", "Subject and method", "Figures",
-    "Uncertainty budget of the identified geometry", "Identified geometry", "Observability",
-    "Conditions", "Instruments and traceability", "Files", "Authorisation",
+    "As found and as left", "What was corrected", "What it holds for", "Subject",
+    "Statement of conformity", "How it was measured", "Uncertainty budget", "Identified geometry",
+    "Records and residuals", "Conditions", "Instruments and traceability", "Files", "Authorisation",
 ]  # fmt: skip
 
 
 def text_of(page: str) -> str:
-    without = re.sub(r"<(style|svg)\b.*?</\1>", "", page, flags=re.DOTALL)
+    without = re.sub(r"<(style|title)\b.*?</\1>", "", page, flags=re.DOTALL)
     return " ".join(unescape(re.sub(r"<[^>]+>", " ", without)).split())
 
 
@@ -33,7 +36,11 @@ def test_the_page_says_what_the_run_found_the_verdict_first(typed_here, demo, ru
     said, verified = text_of(page), demo.outcome.document["verification"]
     assert said.index("PASS") < said.index("Statement of conformity")
     error = verified["accuracy"]["position"]
-    assert f"position, mm {error['value']:.3f} {error['expanded']:.3f} 0.3 pass" in said
+    first, _, others = said.partition("Statement of conformity")
+    assert f"{error['value']:.3f} mm U {error['expanded']:.3f} mm, limit 0.3 mm: pass" in first
+    assert "SIMULATED" in first
+    assert all(name in first for name in (run.name, "encoder of leg 6 (node 6): 1006", "Teach anew"))
+    assert "SIMULATED" in others
     assert f"{verified['before_mm']:.3f} {verified['after_mm']:.3f}" in said
     assert "it was not checked" in said
     digest = hashlib.sha256((run / "journal.jsonl").read_bytes()).hexdigest()
@@ -43,11 +50,52 @@ def test_the_page_says_what_the_run_found_the_verdict_first(typed_here, demo, ru
     closed = next(
         one.event for one in read_entries(run / "journal.jsonl") if isinstance(one.event, events.SetClosed)
     )
-    drift = re.escape(shown(max(map(abs, closed.drift_mm))))
-    assert re.search(rf"\bpoint 1 11 [\d.]+ [mu]m {drift} point 2 11 ", said)
+    drift = f"{max(map(abs, closed.drift_mm)):.3f}"
+    assert re.search(rf"\bpoint 1 11 [\d.]+ {drift} point 2 11 ", said)
     for parameter in json.loads((run / "result.json").read_text())["parameters"]:
         is_free = parameter["sigma"] > 0.0
         assert (re.search(rf"\b{parameter['name']} mm -?\d", said) is not None) == is_free
+
+
+def test_every_measured_deviation_and_change_is_said_where_it_is_drawn(typed_here, run) -> None:
+    assert typed_here("report", run).code == 0
+    page = (run / "report.html").read_text()
+    said = [unescape(one) for one in re.findall(r"<g><title>(.*?)</title>", page)]
+    entries = [one.event for one in read_entries(run / "journal.jsonl")]
+    after = next(one for one in entries if isinstance(one, events.RecordTaken) and is_held_out(one))
+    size = hypot(*after.deviation_mm)
+    assert any(f"{size:.3f} mm (x {after.deviation_mm[0]:+.3f}, " in one for one in said)
+    result = json.loads((run / "result.json").read_text())
+    for parameter in result["parameters"]:
+        if parameter["sigma"]:
+            assert any(
+                one.startswith(parameter["name"]) and f"{parameter['value']:.3f}" in one for one in said
+            )
+
+
+def is_held_out(record: events.RecordTaken) -> bool:
+    return record.at.phase is Phase.AFTER and record.orientation == 2
+
+
+def test_the_budget_adds_up_and_the_noise_is_compared_in_one_unit(typed_here, run) -> None:
+    """Also where a cause is largest at another pose than all together."""
+    file = run / "result.json"
+    result = json.loads(file.read_text())
+    budget = result["uncertainty"]
+    budget["lines"][0] |= {"part_mm": 0.04, "size": 1.0, "combined_mm": 9.0}
+    budget["lines"][1] |= {"part_mm": 0.0003, "size": 1.0}
+    budget["standard_mm"] = hypot(budget["noise_part_mm"], 0.04, 0.0003)
+    file.write_text(json.dumps(result))
+    assert typed_here("report", run).code == 0
+    said = text_of((run / "report.html").read_text())
+    table = re.search(r"part of u, mm (.*) U = ([\d.]+) mm = ([\d.]+) u", said)
+    assert table is not None
+    *parts, total = map(float, re.findall(r"\b\d\.\d{3}\b", table[1]))
+    assert len(parts) == 3
+    assert hypot(*parts) == pytest.approx(total, abs=0.001)
+    assert float(table[2]) == pytest.approx(float(table[3]) * total, abs=0.002)
+    gauge = result["noise"]["gauge_mm"]
+    assert f"gauge, um {1e3 * gauge['stated']:.2f} {1e3 * gauge['estimated']:.2f} +- " in said
 
 
 def test_it_is_the_same_again_and_changes_nothing_else(typed_here, run) -> None:

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import date
 from enum import StrEnum
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,16 +22,11 @@ PDF_STANDARD: Final = "a-2b"
 
 
 class Tone(StrEnum):
-    """How a verdict is coloured, and the sign that says the same without colour."""
+    """How a verdict is coloured."""
 
     GOOD = "good"
     OPEN = "open"
     BAD = "bad"
-
-    @property
-    def sign(self) -> str:
-        """The sign before the verdict."""
-        return {Tone.GOOD: "\u2713", Tone.OPEN: "?", Tone.BAD: "\u2717"}[self]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,24 +46,11 @@ class Facts:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Rows of as many cells as there are columns; from ``numbers_from`` on they are numbers, if any are."""
+    """Rows of as many cells as there are columns, which from ``numbers_from`` on are numbers."""
 
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
-    numbers_from: int | None = 1
-
-    @property
-    def first_number(self) -> int:
-        """The first column of numbers; beyond the last one if there is none."""
-        return len(self.columns) if self.numbers_from is None else self.numbers_from
-
-    @property
-    def widths(self) -> list[str]:
-        """Widths for typst: by the longest texts; without numbers the longest column takes what is left."""
-        longest = [max(map(len, column)) for column in zip(self.columns, *self.rows, strict=True)]
-        if self.numbers_from is not None:
-            return [f"{size + 2}fr" for size in longest]
-        return ["1fr" if size == max(longest) else "auto" for size in longest]
+    numbers_from: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,15 +80,9 @@ class Chapter:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A report, whose first page has all but the chapters.
+    """A report: the verdict and its ``meaning``, errors as ``cards``, robot and ``summary`` are page one.
 
-    Attributes:
-        identifier: is on each page.
-        meaning: the verdict in a sentence.
-        cards: the errors with their limits.
-        summary: what follows the cards.
-        is_simulated: whether the robot was; then every page says so.
-        robot_svg: a drawing of the robot; empty without.
+    ``identifier`` is on each page, and SIMULATED across it where it was; ``tone`` colours the verdict.
     """
 
     title: str
@@ -140,21 +115,11 @@ def rendered(
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters["style_string"] = _style_string
     return environment.get_template(template).render(values)
 
 
 def _shown(value: object) -> object:
     return printable(value) if isinstance(value, str) and not isinstance(value, Markup) else value
-
-
-def _style_string(text: str) -> str:
-    """A string of a style sheet; anything but letters, digits and a few signs by its number."""
-    signs = (
-        sign if sign.isascii() and (sign.isalnum() or sign in " ._-/") else f"\\{ord(sign):x} "
-        for sign in text
-    )
-    return f'"{"".join(signs)}"'
 
 
 def html_of(report: Report) -> str:
@@ -170,6 +135,7 @@ def pdf_of(report: Report) -> bytes:
     """
     try:
         import typst  # noqa: PLC0415 - an optional package
+        from matplotlib import get_data_path  # noqa: PLC0415 - only a PDF needs its fonts
     except ImportError as error:
         raise UsageError(
             "a PDF needs the package typst",
@@ -177,15 +143,9 @@ def pdf_of(report: Report) -> bytes:
         ) from error
     # Every text is a string literal, never markup.
     markup = rendered("report.typ.j2", _literal, is_markup=False, report=report).encode()
-    fonts = typst.Fonts(include_system_fonts=False, font_paths=_fonts())
+    # Typst has no sans serif of its own; matplotlib comes with DejaVu Sans.
+    fonts = typst.Fonts(include_system_fonts=False, font_paths=[f"{get_data_path()}/fonts/ttf"])
     return typst.compile(markup, format="pdf", pdf_standards=PDF_STANDARD, font_paths=fonts)
-
-
-def _fonts() -> list[str]:
-    """Where DejaVu Sans is, which comes with matplotlib: typst has no sans serif of its own."""
-    found = find_spec("matplotlib")
-    places = (found and found.submodule_search_locations) or ()
-    return [str(Path(place) / "mpl-data" / "fonts" / "ttf") for place in places]
 
 
 def _literal(value: object) -> object:

@@ -30,6 +30,7 @@ def report_of(run: ReportedRun, earlier: ReportedRun | None = None, robot_svg: s
         UsageError: the two cannot be compared.
     """
     verdict = run.state.verdict
+    serial_numbers = (f"{one.device.name}: {one.serial_number or NOT_STATED}" for one in instruments(run))
     chapters = (
         statement.statement_chapter(run),
         statement.method_chapter(run),
@@ -51,19 +52,11 @@ def report_of(run: ReportedRun, earlier: ReportedRun | None = None, robot_svg: s
         tone=Tone.OPEN if verdict is None else statement.TONES.get(verdict, Tone.OPEN),
         meaning=statement.meaning_of(run),
         cards=statement.cards_of(run),
-        summary=statement.summary_of(run, _serial_numbers(run)),
+        summary=statement.summary_of(run, "; ".join(serial_numbers)),
         chapters=tuple(chapter for chapter in chapters if chapter is not None),
         is_simulated=run.settings.simulation is not None,
         robot_svg=robot_svg,
     )
-
-
-def _serial_numbers(run: ReportedRun) -> str:
-    """Every instrument with its serial number, in a line, and those without one."""
-    named = [(one.device.name.partition(" (")[0], one.serial_number) for one in instruments(run)]
-    stated = [f"{name}: {number}" for name, number in named if number]
-    others = ", ".join(name for name, number in named if not number)
-    return "; ".join([*stated, *([f"{NOT_STATED}: {others}"] if others else [])])
 
 
 def conditions_chapter(run: ReportedRun) -> Chapter:
@@ -110,7 +103,7 @@ def traceability_chapter(run: ReportedRun) -> Chapter:
         rows.append((one.device.name, one.device.description, one.serial_number or NOT_STATED, number, due))
     expired = ", ".join(run.settings.expired_on(day))
     note = (Paragraph(f"Expired on the day of the run: {expired}.", is_strong=True),) if expired else ()
-    table = Table(("Instrument", "kind", "serial number", "certificate", "due"), tuple(rows), None)
+    table = Table(("Instrument", "kind", "serial number", "certificate", "due"), tuple(rows), 5)
     return Chapter("Instruments and traceability", (table, *note))
 
 
@@ -121,7 +114,7 @@ def integrity_chapter(run: ReportedRun) -> Chapter:
         "`hexacell replay` repeats its decisions and results."
     )
     rows = tuple(sorted(run.fingerprints.items()))
-    return Chapter("Files", (Paragraph(text), Table(("File", "SHA-256"), rows, None)))
+    return Chapter("Files", (Paragraph(text), Table(("File", "SHA-256"), rows, 2)))
 
 
 def authorisation_chapter(run: ReportedRun) -> Chapter:

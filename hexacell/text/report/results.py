@@ -171,15 +171,12 @@ def observability_chapter(run: ReportedRun) -> Chapter | None:
 def _noise_table(run: ReportedRun) -> tuple[Table, ...]:
     """The noise that was counted with beside that in the residuals, in one unit; empty if not known."""
     noise, rows = run.document.get("noise") or {}, []
-    for key, level in noise.items():
-        if not isinstance(level, dict) or not noise["told_apart"]:
-            continue
-        instrument, _, name = key.partition("_")
-        unit = JointUnit(name)
-        stated, found, error, most = (
-            f"{1e3 * level[one]:.2f}" for one in ("stated", "estimated", "standard_error", "at_most")
+    for key in (key for key in noise if noise["told_apart"] and key.startswith(("encoder", "gauge"))):
+        instrument, _, unit = key.partition("_")
+        level = {name: f"{1e3 * size:.2f}" for name, size in noise[key].items()}
+        found = "{estimated} +- {standard_error}" if noise[key]["seen"] else "below {at_most}"
+        rows.append(
+            (f"{instrument}, {JointUnit(unit).thousandth}", level["stated"], found.format_map(level))
         )
-        estimate = f"{found} +- {error}" if level["seen"] else f"below {most}"
-        rows.append((f"{instrument}, {unit.thousandth}", stated, estimate))
     columns = ("Noise of a record, one sigma", "counted with", "found in the residuals")
     return (Table(columns, tuple(rows)),) if rows else ()

@@ -15,7 +15,6 @@ from hexacell.text.report.pages import TEMPLATES, Chapter, Facts, Paragraph, Pic
 from hexacell.text.terms import found_sentence
 from hexacell.text.verdict import VERDICT_MEANINGS, not_checked, scale_lines, teaching_sentence
 from hexacell.verdict.decision import Verdict, VerifiedAccuracy
-from hexacell.verdict.model_evidence import ModelTest
 from procedures.run.keys import Phase
 
 NO_VERDICT = "NOT EVALUATED"
@@ -95,9 +94,7 @@ def _deviations(run: ReportedRun) -> tuple[Picture, ...]:
     held_out = {name: run.state.held_out(phase) for name, phase in phases.items()}
     series = {name: [*map(_mark, count(1), found)] for name, found in held_out.items() if found}
     names = [str(number + 1) for number in range(max(map(len, held_out.values())))]
-    caption = (
-        "Distance of the ball from its reference at each held-out pose, mm, as the gauges measured it."
-    )
+    caption = "Distance of the ball from its reference at each held-out pose, mm, by the gauges."
     return (chart(series, names, caption, by_decades=True),) if series else ()
 
 
@@ -123,14 +120,11 @@ def _changed(run: ReportedRun) -> str:
 
 def statement_chapter(run: ReportedRun) -> Chapter:
     """The rule of the verdict, and the tests of the model that it rests on."""
-    rows = [(test.name, f"{'holds' if test.passed else 'FAILS'}: {test.sentence}") for test in _tests(run)]
-    table = (Table(("Test of the model", "result"), tuple(rows), None),) if rows else ()
+    verified = run.state.judged and run.state.judged.verification
+    tests = verified.tests if verified else ()
+    rows = tuple((test.name, f"{'holds' if test.passed else 'FAILS'}: {test.sentence}") for test in tests)
+    table = (Table(("Test of the model", "result"), rows, 2),) if rows else ()
     return Chapter("Statement of conformity", (Paragraph(decision_rule(run.state.accuracy)), *table))
-
-
-def _tests(run: ReportedRun) -> tuple[ModelTest, ...]:
-    judged = run.state.judged
-    return () if judged is None or judged.verification is None else judged.verification.tests
 
 
 def method_chapter(run: ReportedRun) -> Chapter:
@@ -146,7 +140,9 @@ def _gauges_svg() -> str:
     """The part of the drawing of the documentation that shows the gauges."""
     packaged = TEMPLATES / "gauges.svg"
     path = packaged if packaged.is_file() else TEMPLATES.parents[2] / "docs" / "gauges.svg"
-    return path.read_text(encoding="utf-8").replace('viewBox="0 0 1000 560"', 'viewBox="540 10 460 540"')
+    drawing = path.read_text(encoding="utf-8")
+    drawing = drawing.replace('viewBox="0 0 1000 560"', 'class="gauges" viewBox="540 10 460 540"')
+    return drawing.replace("<style>text{", "<style>.gauges text{")
 
 
 def method_sentences(run: ReportedRun) -> str:
@@ -162,7 +158,7 @@ def method_sentences(run: ReportedRun) -> str:
 def _outcome(run: ReportedRun) -> tuple[Paragraph, ...]:
     """What a check or a length check found, or how a run without verdict ended; empty for others."""
     if (judged := run.state.judged) is not None:
-        return () if _tests(run) else (Paragraph(judged.line),)
+        return () if judged.verification else (Paragraph(judged.line),)
     reason = "it is not over" if run.state.ended is None else run.state.ended.line
     return (Paragraph(f"How it ended: {reason}."),)
 

@@ -1,6 +1,7 @@
 """What ``hexacell fit`` prints: the verdict first, no line too wide, nothing that matters left out."""
 
 import json
+import math
 import re
 from dataclasses import replace
 
@@ -126,3 +127,5 @@ def test_the_document_has_all_lines_and_their_sum(assessed_of) -> None:
     assert not rows["scale common to all encoders"]["visible"]
     assert rows["load at work"]["acts"] == "at work only"
     assert document["noise_mm"] < document["standard_mm"] < document["expanded_mm"]
+    parts = [document["noise_part_mm"], *(row["part_mm"] for row in document["lines"])]
+    assert math.hypot(*parts) == pytest.approx(document["standard_mm"])

@@ -50,6 +50,8 @@ def test_squares_of_all_lines_are_added_at_every_pose(exact, budget_of) -> None:
     columns = [budget.noise, *(line.columns for line in budget.lines)]
     each = sum((part[:, :3] ** 2).sum(axis=(1, 2)) for part in columns)
     assert budget.standard_mm == pytest.approx(np.sqrt(np.max(each)))
+    assert np.linalg.norm(budget.parts_mm) == pytest.approx(budget.standard_mm)
+    assert len(budget.parts_mm) == 1 + len(budget.lines)
     flat = np.concatenate([line.columns.reshape(12, -1) for line in budget.lines], axis=1)
     systematic = budget.systematic.reshape(12, -1)
     assert systematic.shape[1] <= 12

@@ -30,7 +30,9 @@ def report_of(run: ReportedRun, earlier: ReportedRun | None = None, robot_svg: s
         UsageError: the two cannot be compared.
     """
     verdict = run.state.verdict
-    serial_numbers = (f"{one.device.name}: {one.serial_number or NOT_STATED}" for one in instruments(run))
+    numbers = [
+        (one.device.name.partition(" (")[0], one.serial_number or NOT_STATED) for one in instruments(run)
+    ]
     chapters = (
         statement.statement_chapter(run),
         statement.method_chapter(run),
@@ -52,7 +54,7 @@ def report_of(run: ReportedRun, earlier: ReportedRun | None = None, robot_svg: s
         tone=Tone.OPEN if verdict is None else statement.TONES.get(verdict, Tone.OPEN),
         meaning=statement.meaning_of(run),
         cards=statement.cards_of(run),
-        summary=statement.summary_of(run, "; ".join(serial_numbers)),
+        summary=statement.summary_of(run, "; ".join(map(": ".join, numbers))),
         chapters=tuple(chapter for chapter in chapters if chapter is not None),
         is_simulated=run.settings.simulation is not None,
         robot_svg=robot_svg,

@@ -18,25 +18,26 @@ from hexacell.uncertainty.statement import COVERAGE_FACTOR
 
 
 def uncertainty_chapter(run: ReportedRun) -> Chapter | None:
-    """The budget that U comes from; None without an identification, or from a version without parts."""
-    budget = run.document.get("uncertainty") or {}
-    if "noise_part_mm" not in budget:
+    """The budget that U comes from; None without an identification."""
+    if not (budget := run.document.get("uncertainty")):
         return None
-    unit = unit_of(budget["standard_mm"])
-    rows = [("noise of the readings", "measured and stated", "", unit.number(budget["noise_part_mm"]))]
+    # The first documents had no parts at one pose.
+    key, where = ("part_mm", "all together are") if "noise_part_mm" in budget else ("combined_mm", "it is")
+    unit, noise_mm = unit_of(budget["standard_mm"]), budget.get("noise_part_mm", budget["noise_mm"])
+    rows = [("noise of the readings", "measured and stated", "", unit.number(noise_mm))]
     rows += [
-        (line["name"], line["source"], f"{line['size']:.3g} {line['unit']}", unit.number(line["part_mm"]))
+        (line["name"], line["source"], f"{line['size']:.3g} {line['unit']}", unit.number(line[key]))
         for line in budget["lines"]
-        if line["part_mm"] >= unit.smallest
+        if line[key] >= unit.smallest
     ]
-    small = [line["part_mm"] for line in budget["lines"] if 0.0 < line["part_mm"] < unit.smallest]
+    small = [line[key] for line in budget["lines"] if 0.0 < line[key] < unit.smallest]
     if small:
         rows.append((f"{len(small)} smaller ones", "", "", unit.number(hypot(*small))))
     rows.append(("standard uncertainty u: root of the squares", "", "", unit.number(budget["standard_mm"])))
     table = Table(("Cause", "source", "size", f"part of u, {unit.name}"), tuple(rows), 2)
     unseen = [line["name"] for line in budget["lines"] if not line["visible"]]
     note = (Paragraph(f"No record shows these: {', '.join(unseen)}."),) if unseen else ()
-    text = "Each part is one standard deviation at the task pose where all together are largest."
+    text = f"Each part is one standard deviation at the task pose where {where} largest."
     return Chapter("Uncertainty budget", (Paragraph(text), table, Paragraph(_expanded(run)), *note))
 
 

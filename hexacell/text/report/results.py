@@ -91,9 +91,7 @@ def _changes(rows: Sequence[ParameterRow]) -> Picture:
         )
         for one in rows
     ]
-    caption = (
-        f"Change of each parameter, {units}; a line through a mark is its expanded uncertainty (k = 2)."
-    )
+    caption = f"Change of each parameter, {units}, with its expanded uncertainty (k = 2)."
     return chart({"change": marks}, [one.name for one in rows], caption)
 
 

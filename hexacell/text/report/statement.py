@@ -31,7 +31,6 @@ MODES = {
     "length": "check of the length scale; nothing was changed",
 }
 
-
 MODELS = {
     "optimise": "Held-out poses, which took no part, test the model.",
     "quick": "The last accepted result takes part, with what may have drifted; held-out poses test it.",

@@ -82,7 +82,7 @@ def certificate_of_run(run: ReportedRun) -> bytes:
         verdict=verdict.value,
         meaning=VERDICT_MEANINGS[verdict],
         conformity=CONFORMITY.get(verdict),
-        decision_rule=decision_rule(accuracy),
+        decision_rule=decision_rule(run),
         scope=scope_sentences(accuracy),
         mode=MODES[run.started.mode],
         method=method_sentences(run),

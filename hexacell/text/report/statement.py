@@ -51,15 +51,15 @@ def meaning_of(run: ReportedRun) -> str:
 def cards_of(run: ReportedRun) -> tuple[Picture, ...]:
     """The errors that the verdict is on, each with U and its limit."""
     judged, accuracy = run.state.judged, run.state.accuracy
-    errors = () if accuracy is None else accuracy.errors
     if judged is not None and judged.length is not None and judged.length.error is not None:
-        errors = (("position", "mm", judged.length.error),)
+        return (error_card("Largest position error by the length scale", judged.length.error, "mm"),)
+    errors = () if accuracy is None else accuracy.errors
     return tuple(error_card(f"Largest {name} error at the task", one, unit) for name, unit, one in errors)
 
 
 def summary_of(run: ReportedRun, serial_numbers: str) -> tuple[Chapter, ...]:
     """What follows the errors on the first page: before and after, what was corrected, the scope."""
-    state, report = run.state, run.settings.report
+    state, report, is_of_length = run.state, run.settings.report, run.started.mode == "length"
     moved = None if state.proposed is None else state.proposed.displacement
     rows = tuple(_found_and_left_rows(run))
     table = (Table(("", "as found", "as left"), rows),) if rows else ()
@@ -81,7 +81,7 @@ def summary_of(run: ReportedRun, serial_numbers: str) -> tuple[Chapter, ...]:
         Chapter("Outcome", _outcome(run)),
         Chapter("As found and as left", (*table, *_deviations(run))),
         Chapter("What was corrected", (Paragraph(" ".join(filter(None, left))),)),
-        Chapter("What it holds for", (Paragraph(scope_sentences(state.accuracy)),)),
+        Chapter("What it holds for", () if is_of_length else (Paragraph(scope_sentences(state.accuracy)),)),
         Chapter("Subject", (Facts(facts), Facts((("Instruments", serial_numbers),)))),
     )
     return tuple(chapter for chapter in chapters if chapter.blocks)
@@ -119,11 +119,10 @@ def _changed(run: ReportedRun) -> str:
 
 def statement_chapter(run: ReportedRun) -> Chapter:
     """The rule of the verdict, and the tests of the model that it rests on."""
-    verified = run.state.judged and run.state.judged.verification
-    tests = verified.tests if verified else ()
+    tests = verified.tests if (verified := run.state.judged and run.state.judged.verification) else ()
     rows = tuple((test.name, f"{'holds' if test.passed else 'FAILS'}: {test.sentence}") for test in tests)
     table = (Table(("Test of the model", "result"), rows, 2),) if rows else ()
-    return Chapter("Statement of conformity", (Paragraph(decision_rule(run.state.accuracy)), *table))
+    return Chapter("Statement of conformity", (Paragraph(decision_rule(run)), *table))
 
 
 def method_chapter(run: ReportedRun) -> Chapter:
@@ -175,9 +174,9 @@ def scope_sentences(accuracy: VerifiedAccuracy | None) -> str:
     )
 
 
-def decision_rule(accuracy: VerifiedAccuracy | None) -> str:
+def decision_rule(run: ReportedRun) -> str:
     """The rule by which errors and their uncertainty become a verdict."""
-    factor = 1.0 if accuracy is None else accuracy.position.guard_band_factor
+    factor = run.settings.acceptance.guard_band_factor
     band = "U" if factor == 1.0 else f"{factor:g} U"
     return (
         f"Decision rule: pass if error + {band} is at most the limit, fail if error - {band} is above it, "

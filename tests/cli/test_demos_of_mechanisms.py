@@ -66,6 +66,8 @@ def test_nothing_is_said_in_words_of_another_mechanism(demo: Demo, typed_here) -
         "fit": fitted.out + fitted.err,
         **{name: (demo.run / name).read_text() for name in ("report.html", "result.json", "cell.toml")},
     }
+    unit = load_cell(demo.cell).settings.mechanism.words.joint_unit
+    assert f"encoder_{unit}" in json.loads(texts["result.json"])["noise"]
     for name, text in texts.items():
         assert not NOT_THEIRS.findall(text), name
 

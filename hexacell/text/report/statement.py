@@ -3,6 +3,7 @@
 In the order and words of ISO/IEC 17025:2017, 7.8, where they apply.
 """
 
+import re
 from collections.abc import Iterator
 from itertools import count
 from math import hypot
@@ -135,10 +136,10 @@ def method_chapter(run: ReportedRun) -> Chapter:
 
 
 def _gauges_svg() -> str:
-    """The part of the drawing of the documentation that shows the gauges."""
+    """The part of the drawing of the documentation that shows the gauges; its style is for it alone."""
     packaged = TEMPLATES / "gauges.svg"
     path = packaged if packaged.is_file() else TEMPLATES.parents[2] / "docs" / "gauges.svg"
-    drawing = path.read_text(encoding="utf-8")
+    drawing = re.sub('(?s)<g id="robot">.*?</g>', "", path.read_text(encoding="utf-8"))
     drawing = drawing.replace('viewBox="0 0 1000 560"', 'class="gauges" viewBox="540 10 460 540"')
     return drawing.replace("<style>text{", "<style>.gauges text{")
 

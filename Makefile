@@ -68,6 +68,8 @@ figures: venv
 	HEXACELL_UPDATE_SNAPSHOTS=1 $(RUN) pytest -q tests/screen/test_snapshots.py
 	cp tests/screen/snapshots/measure-140x40-dark.svg docs/screen-measure.svg
 	cp tests/screen/snapshots/review-140x40-light.svg docs/screen-review.svg
+	for cell in simulated-hexaglide gough-stewart linapod rotary-cranks; do \
+		.venv/bin/hexacell view configs/$$cell.toml --output docs/robot-$$cell.svg --no-open; done
 	rm -rf build/study
 	.venv/bin/hexacell study paper --folder build/study
 	.venv/bin/hexacell study design --folder build/study

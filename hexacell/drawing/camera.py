@@ -48,7 +48,9 @@ class Camera:
         """
         azimuth, height = np.radians(direction_deg)
         right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
-        away = np.array([np.cos(height) * np.cos(azimuth), np.cos(height) * np.sin(azimuth), np.sin(height)])
+        away = np.array(
+            [np.cos(height) * np.cos(azimuth), np.cos(height) * np.sin(azimuth), np.sin(height)]
+        )
         axes = np.stack([right, np.cross(away, right), away])
         flat = scene.points @ axes[:2].T * (1.0, -1.0)
         lowest, highest = flat.min(axis=0), flat.max(axis=0)
@@ -78,7 +80,7 @@ class Camera:
 
 def _layer(shape: Shape) -> int:
     if isinstance(shape, Label) or shape.role in ERRORS:
-        return 4
+        return 5 if shape.role is Role.AFTER else 4  # the smaller ones
     if shape.role in IN_FRONT:  # but the axes of the base frame, which may be behind
         return 2 if isinstance(shape, Line) and shape.has_head else 3
     if shape.role in {Role.BASE, Role.RAIL}:

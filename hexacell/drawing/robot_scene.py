@@ -1,7 +1,7 @@
 """A robot at a pose as a scene: base, drives, numbered legs, platform, ball, gauges and axes.
 
-Rails, cranks and fixed joints need no numbers of their own: where the joints at the legs' base ends go while
-the drives move from end to end tells which of these carries them.
+Rails, cranks and fixed joints need no numbers of their own: where the joints at the legs' base ends go,
+while the drives move from end to end, tells which of these carries them.
 """
 
 from collections.abc import Iterable, Iterator
@@ -24,14 +24,14 @@ FLAT = 0.02
 """Points are in one plane if they are apart from it by a smaller share of their extent."""
 
 NUMBER_AT = (0.28, 0.5)
-"""Where legs have their numbers, from the base's end to the platform: odd and even ones, which may cross."""
+"""Where odd and even legs, which may cross, have their numbers: from the base's end to the platform."""
 
 MOTOR, MOTOR_WEIGHT, GAUGE_WEIGHT = 0.15, 2.5, 4.0
-"""Half the length of a motor by its crank; how much wider than other lines a motor and a gauge's body are."""
+"""Half the length of a motor by its crank; times the width of a line: of a motor, of a gauge's body."""
 
-BALL, JOINT, GAUGE, AXIS, WORD = 0.13, 0.05, (0.13, 0.42, 0.8), 0.9, 0.1
-"""Sizes of ball, joints, plunger and body of a gauge, axes, and from them to their words: shares of
-:meth:`DrawnRobot.size`."""
+BALL, DRIVE, JOINT, GAUGE, AXIS, WORD = 0.13, 0.07, 0.05, (0.13, 0.42, 0.8), 0.9, 0.1
+"""Shares of :meth:`DrawnRobot.size`: radii of ball, sliders and joints; from the ball to the plunger, body
+and end of a gauge; length of an axis; from these to their words."""
 
 OF_LEGS = 0.35
 """That size is no larger share of the legs' mean length."""
@@ -44,8 +44,8 @@ class DrawnRobot:
     Attributes:
         lowest: smallest joint variables (6,), in the unit of the mechanism.
         highest: the largest.
-        gauge_signs: of the gauges along x, y and z: 1 for one on the positive side of the ball, which counts
-            up when its plunger is pushed in; -1 on the other side.
+        gauge_signs: of the gauges along x, y and z: 1 on the positive side of the ball, -1 on the other, as
+            they count up when their plungers are pushed in.
     """
 
     mechanism: Mechanism
@@ -68,8 +68,9 @@ class DrawnRobot:
         rows = PoseBatch.of([pose])[[0] * len(joints)]
         return self.mechanism.legs(self.geometry, rows, joints)
 
-    def size(self, legs: Legs) -> float:
+    def size(self, pose: Pose) -> float:
         """By what all sizes are chosen, mm: from the ball to the platform's joints, less for short legs."""
+        legs = self.legs(pose, self.joints(pose))
         lengths = np.linalg.norm(legs.base_joints - legs.platform_joints, axis=-1)
         radius = self.mechanism.platform_radius(self.geometry)
         return float(min(np.max(radius), OF_LEGS * lengths.mean()))
@@ -87,16 +88,15 @@ def robot_scene(robot: DrawnRobot, pose: Pose) -> Scene:
     Raises:
         ReachError: the pose is out of a leg's reach.
     """
-    legs = robot.legs(pose, robot.joints(pose))
-    return Scene((*base_shapes(robot, pose, legs), *moved_shapes(robot, pose, legs)))
+    return Scene((*base_shapes(robot, pose), *moved_shapes(robot, pose)))
 
 
-def base_shapes(robot: DrawnRobot, pose: Pose, legs: Legs) -> Iterator[Shape]:
+def base_shapes(robot: DrawnRobot, pose: Pose) -> Iterator[Shape]:
     """What does not move: fixed joints, rails, or the motors of cranks; and the axes of the base frame.
 
     These are at its origin, or at the base where the ball would cover them.
     """
-    tracks, size = robot.tracks(pose), robot.size(legs)
+    tracks, size = robot.tracks(pose), robot.size(pose)
     yield from _motors(tracks) if _has_cranks(robot) else _rails(tracks, JOINT * size)
     is_covered = np.linalg.norm(pose.position) < 2.0 * size
     origin = tracks.mean(axis=(0, 1)) if is_covered else np.zeros(3)
@@ -105,16 +105,16 @@ def base_shapes(robot: DrawnRobot, pose: Pose, legs: Legs) -> Iterator[Shape]:
         yield Label(role, origin + np.outer((AXIS + WORD, AXIS), size * axis), f"+{role}")
 
 
-def moved_shapes(robot: DrawnRobot, pose: Pose, legs: Legs) -> Iterator[Shape]:
+def moved_shapes(robot: DrawnRobot, pose: Pose) -> Iterator[Shape]:
     """What moves with the pose: cranks or sliders, legs with their numbers, platform, ball, gauges."""
-    size = robot.size(legs)
+    legs, size = robot.legs(pose, robot.joints(pose)), robot.size(pose)
     starts, ends = legs.base_joints[0], legs.platform_joints[0]
     centres = crank_centres(robot.tracks(pose)) if _has_cranks(robot) else starts
     for leg in range(LEGS):
         if _has_cranks(robot):
             yield Line(Role.DRIVE, np.stack([centres[leg], starts[leg]]))
         yield Line(Role.LEG, np.stack([starts[leg], ends[leg]]))
-        yield Ball(Role.DRIVE, starts[leg][None], JOINT * size)
+        yield Ball(Role.DRIVE, starts[leg][None], DRIVE * size)
         yield Ball(Role.PLATFORM, ends[leg][None], JOINT * size)
         at = starts[leg] + NUMBER_AT[leg % 2] * (ends[leg] - starts[leg])
         yield Label(Role.LEG, at[None], str(leg + 1))
@@ -140,7 +140,8 @@ def _rails(tracks: Array, joint: float) -> Iterator[Shape]:
         yield Surface(Role.BASE, outline(first))
         return
     for track in tracks:
-        yield Line(Role.RAIL, track)
+        is_straight = _thickness(track, 1) < FLAT
+        yield Line(Role.RAIL, track[[0, -1]] if is_straight else track)
     if _thickness(np.concatenate([first, last])) < FLAT:
         yield Surface(Role.BASE, outline(np.concatenate([first, last])))
         return
@@ -186,7 +187,7 @@ def outline(points: Array) -> Array:
     return np.asarray(points[ConvexHull(np.stack([away @ u, away @ v], axis=-1)).vertices])
 
 
-def _thickness(points: Array) -> float:
-    """How far points (n, 3) are from their plane, as a share of their extent."""
+def _thickness(points: Array, dimensions: int = 2) -> float:
+    """How far points (n, 3) are from being in a plane, or a line, as a share of their extent."""
     extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return float(extents[2] / extents[0])
+    return float(extents[dimensions] / extents[0])

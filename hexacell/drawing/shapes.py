@@ -78,7 +78,7 @@ class Ball:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Label:
-    """A short text in the middle of a place (1, 3), mm; or at the first of two (2, 3), away from the other."""
+    """A short text about a place (1, 3), mm; or at the first of two (2, 3), away from the other."""
 
     role: Role
     points: Array

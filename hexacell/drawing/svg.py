@@ -1,4 +1,4 @@
-"""A scene as SVG text: one set of colours for light and dark pages, no fonts and no files from elsewhere."""
+"""A scene as SVG text: one set of colours for light and dark pages, no fonts of its own."""
 
 from collections.abc import Iterator
 from html import escape
@@ -9,8 +9,8 @@ from hexacell.drawing.camera import DIRECTION_DEG, Camera
 from hexacell.drawing.shapes import COLOURS, Ball, Label, Line, Role, Scene, Shape, Surface
 from hexacell.kinematics.rotations import Array
 
-WIDTH, HEIGHT, MARGIN = 640, 480, 36
-"""Within which it is as large as possible; what stays free is cut off, but for the margin."""
+WIDTH, HEIGHT, MARGIN = 640, 420, 36
+"""Within which it is as large as possible; of the height what stays free is cut off, but for the margin."""
 
 WIDTHS = {Role.RAIL: 5.0, Role.DRIVE: 6.0, Role.LEG: 6.0, Role.PLATFORM: 5.0, Role.BASE: 1.5}
 """Of lines, in units of the picture; those of all other roles are ``THIN``."""
@@ -28,15 +28,15 @@ SHORTEST = 4.0
 def svg_of(
     scene: Scene, title: str, description: str, direction_deg: tuple[float, float] = DIRECTION_DEG
 ) -> str:
-    """The picture, the same byte for byte each time; title and description are for those who do not see it."""
+    """The picture, the same byte for byte each time; its title and description are read out."""
     camera = Camera.fitted(scene, (WIDTH, HEIGHT), MARGIN, direction_deg)
     shown = camera.places(scene.points)
-    (left, top), (width, height) = shown.min(axis=0) - MARGIN, np.ptp(shown, axis=0) + 2.0 * MARGIN
+    top, height = shown[:, 1].min() - MARGIN, np.ptp(shown[:, 1]) + 2.0 * MARGIN
     return "\n".join(
         (
-            f'<svg xmlns="http://www.w3.org/2000/svg" role="img"',
-            f'  width="{width:.0f}" height="{height:.0f}"',
-            f'  viewBox="{left:.0f} {top:.0f} {width:.0f} {height:.0f}"',
+            '<svg xmlns="http://www.w3.org/2000/svg" role="img"',
+            f'  width="{WIDTH}" height="{height:.0f}"',
+            f'  viewBox="0 {top:.0f} {WIDTH} {height:.0f}"',
             '  stroke-linecap="round" stroke-linejoin="round" font-family="sans-serif" font-weight="bold">',
             f"<title>{escape(title)}</title>",
             f"<desc>{escape(description)}</desc>",
@@ -63,7 +63,8 @@ def _drawn(shape: Shape, camera: Camera) -> Iterator[str]:
                     x - 0.35 * radius, y - 0.35 * radius, 0.3 * radius, 'fill="#fff" fill-opacity="0.7"'
                 )
         case Label():
-            yield from _word(shape, *places[0], ANCHORS[camera.side(shape)], colour)
+            x, y = places[0]
+            yield from _word(shape, x, y, ANCHORS[camera.side(shape)], colour)
 
 
 def _word(label: Label, x: float, y: float, anchor: str, colour: str) -> Iterator[str]:
@@ -80,7 +81,7 @@ def _line(line: Line, places: Array, colour: str) -> Iterator[str]:
         start, end = places
         length = float(np.linalg.norm(end - start))
         if length < SHORTEST:
-            yield _circle(*end, SHORTEST / 2.0, f'fill="{colour}"')
+            yield _circle(end[0], end[1], SHORTEST / 2.0, f'fill="{colour}"')
             return
         along = (end - start) / length
         neck = end - min(9.0, 0.6 * length) * along

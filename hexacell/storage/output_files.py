@@ -49,6 +49,8 @@ REPORT = OutputKind(
 )
 PICTURE_MARK = b"<!-- made by hexacell study, which replaces this file -->\n"
 PICTURE = OutputKind("a picture of a study", re.compile(re.escape(PICTURE_MARK) + rb"\Z"))
+VIEW_MARK = b"<!-- made by hexacell view, which replaces this file -->\n"
+VIEW = OutputKind("a view of a robot", re.compile(re.escape(VIEW_MARK) + rb"\Z"), may_be_in_run=True)
 SERVED_MARK = b"# made by hexacell simulate, which replaces this file\n"
 SERVED_CELL = OutputKind("a cell file of `simulate`", re.compile(rb"\A" + re.escape(SERVED_MARK)))
 UNIT = OutputKind("a unit of systemd", re.compile(rb"\A# Written by `hexacell schedule` for "))

@@ -5,11 +5,13 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
+from hexacell.drawing.shapes import COLOURS, Role
+
 SMALLEST_MM = 1e-4
 """A distance that is drawn on a logarithmic axis is no smaller."""
 
-BEFORE, AFTER, INK = "#b35806", "#2166ac", "#222222"
-"""Apart for colour-blind readers too; the markers differ besides."""
+BEFORE, AFTER, INK = COLOURS[Role.BEFORE], COLOURS[Role.AFTER], "#222222"
+"""The markers differ besides."""
 
 Place = tuple[float, float, float, float]
 """Left, bottom, width and height of axes, in shares of the figure's."""

@@ -25,6 +25,7 @@ FOLDERS = {"demo --folder", "host --folder", "replay --export", "schedule --fold
 
 ARGUMENTS = dict.fromkeys(("run", "simulate", "status"), ("CELL",)) | {
     "report": ("RUN",),
+    "view": ("CELL", "--no-open"),
     "schedule": ("CELL", "--daily", "02:30"),
     "devices": (),
 }

@@ -15,7 +15,7 @@ from hexacell.cli.arguments.parser import (
     bounded_seconds,
     whole_number,
 )
-from hexacell.storage.output_files import EVENTS, METRICS, NEW_CELL, REPORT, SERVED_CELL
+from hexacell.storage.output_files import EVENTS, METRICS, NEW_CELL, REPORT, SERVED_CELL, VIEW
 
 SHELLS = ("bash", "zsh", "fish")
 
@@ -300,9 +300,19 @@ def _report(commands: Any) -> None:  # noqa: ANN401
     parser.add_json()
 
 
+def _view(commands: Any) -> None:  # noqa: ANN401
+    parser = add_command(commands, "view", "show the robot of a cell or a run in space, in the browser")
+    words = "the cell file (TOML), or a run folder"
+    parser.add_argument("of", type=Path, metavar="CELL|RUN", help=words)
+    words = "where to (default: view.html in the run folder, or beside the cell file); .svg gives a picture"
+    add_output(parser, "--output", VIEW, words)
+    add_flag(parser, "--no-open", "write the file, and open no browser")
+    parser.add_json()
+
+
 COMMANDS = (
     *(_demo, _run, _tui, _length, _preflight, _simulate, _host, _next, _fit, _replay),
-    *(_apply, _rollback, _history, _report),
+    *(_apply, _rollback, _history, _report, _view),
     *(_devices, _schedule, _status, _notify, _serve, _cell, _completion),
     _studies,
 )

@@ -23,8 +23,8 @@ TRACK_POINTS = 25
 FLAT = 0.02
 """Points are in one plane if they are apart from it by a smaller share of their extent."""
 
-NUMBER_AT = (0.28, 0.5)
-"""Where odd and even legs, which may cross, have their numbers: from the base's end to the platform."""
+NUMBER_AT = (0.22, 0.4, 0.58)
+"""Where legs have their numbers, from the base's end to the platform: apart where neighbours cross."""
 
 MOTOR, MOTOR_WEIGHT, GAUGE_WEIGHT = 0.15, 2.5, 4.0
 """Half the length of a motor by its crank; times the width of a line: of a motor, of a gauge's body."""
@@ -116,7 +116,7 @@ def moved_shapes(robot: DrawnRobot, pose: Pose) -> Iterator[Shape]:
         yield Line(Role.LEG, np.stack([starts[leg], ends[leg]]))
         yield Ball(Role.DRIVE, starts[leg][None], DRIVE * size)
         yield Ball(Role.PLATFORM, ends[leg][None], JOINT * size)
-        at = starts[leg] + NUMBER_AT[leg % 2] * (ends[leg] - starts[leg])
+        at = starts[leg] + NUMBER_AT[leg % len(NUMBER_AT)] * (ends[leg] - starts[leg])
         yield Label(Role.LEG, at[None], str(leg + 1))
     yield Surface(Role.PLATFORM, outline(ends))
     yield Line(Role.PLATFORM, np.stack([ends.mean(axis=0), pose.position]))

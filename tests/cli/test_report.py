@@ -191,3 +191,16 @@ def test_a_forged_journal_is_told(typed_here, run) -> None:
     said = " ".join(outcome.err.split())
     assert "journal.jsonl:1: this line of the journal cannot be of this run: a geometry has other" in said
     assert not (run / "report.html").exists()
+
+
+def test_the_first_page_has_the_robot_with_its_errors_as_found_and_as_left(typed_here, run) -> None:
+    assert typed_here("report", run).code == 0
+    page = (run / "report.html").read_text()
+    first = page[: page.index("<h2>As found and as left</h2>")]
+    shown = text_of(first)
+    assert re.search(
+        r"The robot at X.*, 20 times as far: as found \(brown\), up to 5\.\d+ mm and as left", shown
+    )
+    drawing = first[first.index("<svg") : first.index("</svg>")]
+    assert {"#b35806", "#2166ac"} <= set(re.findall(r"#[0-9a-f]{6}", drawing))
+    assert sorted(re.findall(r">(\d)</text>", drawing)) == list("123456")

@@ -306,7 +306,7 @@ def _view(commands: Any) -> None:  # noqa: ANN401
     parser.add_argument("of", type=Path, metavar="CELL|RUN", help=words)
     words = "where to (default: view.html in the run folder, or beside the cell file); .svg gives a picture"
     add_output(parser, "--output", VIEW, words)
-    add_flag(parser, "--no-open", "write the file, and open no browser")
+    add_flag(parser, "--no-open", "write the file, and open no browser; with --json neither")
     parser.add_json()
 
 

@@ -4,29 +4,29 @@ Rails, cranks and fixed joints need no numbers of their own: where the joints at
 while the drives move from end to end, tells which of these carries them.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell.drawing.shapes import AXIS_ROLES, Ball, Label, Line, Role, Scene, Shape, Surface
+from hexacell.drawing.shapes import AXIS_ROLES, Form, Role, Scene, Shape
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import Branch, Mechanism, inverse_kinematics
-from hexacell.kinematics.parameters import LEGS, JointUnit
+from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 
 TRACK_POINTS = 25
-"""Places of a drive from end to end, of which the middle one tells a curve from a straight line."""
+"""Places of a drive from end to end."""
 
 FLAT = 0.02
-"""Points are in one plane if they are apart from it by a smaller share of their extent."""
+"""Points are in a plane, or in line, if they are apart from it by a smaller share of their extent."""
 
 NUMBER_AT = (0.22, 0.4, 0.58)
 """Where legs have their numbers, from the base's end to the platform: apart where neighbours cross."""
 
-MOTOR, MOTOR_WEIGHT, GAUGE_WEIGHT = 0.15, 2.5, 4.0
+MOTOR, MOTOR_WIDTH, GAUGE_WIDTH = 0.15, 2.5, 4.0
 """Half the length of a motor by its crank; times the width of a line: of a motor, of a gauge's body."""
 
 BALL, DRIVE, JOINT, GAUGE, AXIS, WORD = 0.13, 0.07, 0.05, (0.13, 0.42, 0.8), 0.9, 0.1
@@ -56,30 +56,28 @@ class DrawnRobot:
     gauge_signs: tuple[int, int, int] = (1, 1, 1)
 
     def joints(self, pose: Pose) -> Array:
-        """The joint variables (1, 6) of a pose.
-
-        Raises:
-            ReachError: the pose is out of a leg's reach.
-        """
+        """The joint variables (1, 6) of a pose; raises ``ReachError`` if it is out of reach."""
         return inverse_kinematics(self.mechanism, self.geometry, self.branch, PoseBatch.of([pose]))
 
     def legs(self, pose: Pose, joints: Array) -> Legs:
         """The legs at a pose for each of some joint variables (n, 6)."""
-        rows = PoseBatch.of([pose])[[0] * len(joints)]
-        return self.mechanism.legs(self.geometry, rows, joints)
+        return self.mechanism.legs(self.geometry, PoseBatch.of([pose] * len(joints)), joints)
 
     def size(self, pose: Pose) -> float:
         """By what all sizes are chosen, mm: from the ball to the platform's joints, less for short legs."""
         legs = self.legs(pose, self.joints(pose))
         lengths = np.linalg.norm(legs.base_joints - legs.platform_joints, axis=-1)
-        radius = self.mechanism.platform_radius(self.geometry)
-        return float(min(np.max(radius), OF_LEGS * lengths.mean()))
+        return float(min(np.max(self.mechanism.platform_radius(self.geometry)), OF_LEGS * lengths.mean()))
 
     def tracks(self, pose: Pose) -> Array:
         """Where each leg's joint at the base's end goes (6, m, 3), mm, from end to end of its drive."""
-        share = np.linspace(0.0, 1.0, TRACK_POINTS)[:, None]
-        joints = (1.0 - share) * self.lowest + share * self.highest
+        joints = np.linspace(self.lowest, self.highest, TRACK_POINTS)
         return np.swapaxes(self.legs(pose, joints).base_joints, 0, 1)
+
+    @property
+    def has_cranks(self) -> bool:
+        """Whether its drives turn."""
+        return self.mechanism.words.joint_unit is JointUnit.DEG
 
 
 def robot_scene(robot: DrawnRobot, pose: Pose) -> Scene:
@@ -88,7 +86,7 @@ def robot_scene(robot: DrawnRobot, pose: Pose) -> Scene:
     Raises:
         ReachError: the pose is out of a leg's reach.
     """
-    return Scene((*base_shapes(robot, pose), *moved_shapes(robot, pose)))
+    return (*base_shapes(robot, pose), *moved_shapes(robot, pose))
 
 
 def base_shapes(robot: DrawnRobot, pose: Pose) -> Iterator[Shape]:
@@ -97,83 +95,74 @@ def base_shapes(robot: DrawnRobot, pose: Pose) -> Iterator[Shape]:
     These are at its origin, or at the base where the ball would cover them.
     """
     tracks, size = robot.tracks(pose), robot.size(pose)
-    yield from _motors(tracks) if _has_cranks(robot) else _rails(tracks, JOINT * size)
+    yield from _motors(tracks) if robot.has_cranks else _rails(tracks, JOINT * size)
     is_covered = np.linalg.norm(pose.position) < 2.0 * size
     origin = tracks.mean(axis=(0, 1)) if is_covered else np.zeros(3)
-    for role, axis in zip(AXIS_ROLES, np.eye(3), strict=True):
-        yield Line(role, origin + np.outer((0.0, AXIS * size), axis), has_head=True)
-        yield Label(role, origin + np.outer((AXIS + WORD, AXIS), size * axis), f"+{role}")
+    for role, axis in zip(AXIS_ROLES, size * np.eye(3), strict=True):
+        yield Shape(Form.ARROW, role, origin + np.outer((0.0, AXIS), axis))
+        yield Shape(Form.WORD, role, origin + np.outer((AXIS + WORD, AXIS), axis), text=f"+{role}")
 
 
 def moved_shapes(robot: DrawnRobot, pose: Pose) -> Iterator[Shape]:
     """What moves with the pose: cranks or sliders, legs with their numbers, platform, ball, gauges."""
-    legs, size = robot.legs(pose, robot.joints(pose)), robot.size(pose)
+    legs, size, ball = robot.legs(pose, robot.joints(pose)), robot.size(pose), pose.position
     starts, ends = legs.base_joints[0], legs.platform_joints[0]
-    centres = crank_centres(robot.tracks(pose)) if _has_cranks(robot) else starts
-    for leg in range(LEGS):
-        if _has_cranks(robot):
-            yield Line(Role.DRIVE, np.stack([centres[leg], starts[leg]]))
-        yield Line(Role.LEG, np.stack([starts[leg], ends[leg]]))
-        yield Ball(Role.DRIVE, starts[leg][None], DRIVE * size)
-        yield Ball(Role.PLATFORM, ends[leg][None], JOINT * size)
-        at = starts[leg] + NUMBER_AT[leg % len(NUMBER_AT)] * (ends[leg] - starts[leg])
-        yield Label(Role.LEG, at[None], str(leg + 1))
-    yield Surface(Role.PLATFORM, outline(ends))
-    yield Line(Role.PLATFORM, np.stack([ends.mean(axis=0), pose.position]))
-    yield Ball(Role.BALL, pose.position[None], BALL * size)
-    yield from _gauges(robot.gauge_signs, pose.position, size)
-
-
-def _gauges(signs: Iterable[int], ball: Array, size: float) -> Iterator[Shape]:
-    for role, axis, sign in zip(AXIS_ROLES, np.eye(3), signs, strict=True):
-        tip, front, back = (ball + sign * share * size * axis for share in GAUGE)
-        yield Line(role, np.stack([tip, front]))
-        yield Line(role, np.stack([front, back]), weight=GAUGE_WEIGHT)
-        word = ball + np.outer((GAUGE[-1] + WORD, GAUGE[-1]), sign * size * axis)
-        yield Label(role, word, f"gauge {role}")
+    if robot.has_cranks:
+        for ends_of_crank in np.stack([crank_centres(robot.tracks(pose)), starts], axis=1):
+            yield Shape(Form.LINE, Role.DRIVE, ends_of_crank)
+    for leg, (start, end) in enumerate(zip(starts, ends, strict=True)):
+        yield Shape(Form.LINE, Role.LEG, np.stack([start, end]))
+        yield Shape(Form.BALL, Role.DRIVE, start[None], DRIVE * size)
+        yield Shape(Form.BALL, Role.PLATFORM, end[None], JOINT * size)
+        at = start + NUMBER_AT[leg % len(NUMBER_AT)] * (end - start)
+        yield Shape(Form.WORD, Role.LEG, at[None], text=str(leg + 1))
+    yield Shape(Form.SURFACE, Role.PLATFORM, outline(ends))
+    yield Shape(Form.LINE, Role.PLATFORM, np.stack([ends.mean(axis=0), ball]))
+    yield Shape(Form.BALL, Role.BALL, ball[None], BALL * size)
+    tip, front, back = GAUGE
+    for role, axis, sign in zip(AXIS_ROLES, size * np.eye(3), robot.gauge_signs, strict=True):
+        yield Shape(Form.LINE, role, ball + np.outer((tip, front), sign * axis))
+        yield Shape(Form.LINE, role, ball + np.outer((front, back), sign * axis), GAUGE_WIDTH)
+        yield Shape(
+            Form.WORD, role, ball + np.outer((back + WORD, back), sign * axis), text=f"gauge {role}"
+        )
 
 
 def _rails(tracks: Array, joint: float) -> Iterator[Shape]:
     """Rails, or joints that stay where they are, and the base through their ends."""
     first, last = tracks[:, 0], tracks[:, -1]
     if np.linalg.norm(last - first, axis=-1).max() < joint:
-        yield Surface(Role.BASE, outline(first))
+        yield Shape(Form.SURFACE, Role.BASE, outline(first))
         return
     for track in tracks:
-        is_straight = _thickness(track, 1) < FLAT
-        yield Line(Role.RAIL, track[[0, -1]] if is_straight else track)
-    if _thickness(np.concatenate([first, last])) < FLAT:
-        yield Surface(Role.BASE, outline(np.concatenate([first, last])))
+        yield Shape(Form.LINE, Role.RAIL, track)
+    both = np.concatenate([first, last])
+    extents = np.linalg.svd(both - both.mean(axis=0), compute_uv=False)
+    if extents[2] < FLAT * extents[0]:
+        yield Shape(Form.SURFACE, Role.BASE, outline(both))
         return
-    lower, upper = sorted((first, last), key=lambda ends: float(ends[:, 2].mean()))
-    yield Surface(Role.BASE, outline(lower))
-    corners = outline(upper)
-    yield Line(Role.BASE, np.concatenate([corners, corners[:1]]))
+    lower, upper = sorted((outline(first), outline(last)), key=lambda corners: float(corners[:, 2].mean()))
+    yield Shape(Form.SURFACE, Role.BASE, lower)
+    yield Shape(Form.LINE, Role.BASE, np.concatenate([upper, upper[:1]]))
 
 
 def _motors(tracks: Array) -> Iterator[Shape]:
     """The circles of the cranks' ends as far as they go, and the base through their centres."""
     centres = crank_centres(tracks)
-    yield Surface(Role.BASE, outline(centres))
+    yield Shape(Form.SURFACE, Role.BASE, outline(centres))
     for track, centre in zip(tracks, centres, strict=True):
         axis = np.cross(track[0] - centre, track[TRACK_POINTS // 2] - centre)
         axis *= MOTOR * np.linalg.norm(track[0] - centre) / np.linalg.norm(axis)
-        yield Line(Role.BASE, track)
-        yield Line(Role.DRIVE, np.stack([centre - axis, centre + axis]), weight=MOTOR_WEIGHT)
-
-
-def _has_cranks(robot: DrawnRobot) -> bool:
-    return robot.mechanism.words.joint_unit is JointUnit.DEG
+        yield Shape(Form.LINE, Role.BASE, track)
+        yield Shape(Form.LINE, Role.DRIVE, np.stack([centre - axis, centre + axis]), MOTOR_WIDTH)
 
 
 def crank_centres(tracks: Array) -> Array:
     """The centres (6, 3) of the circles on which some tracks (6, m, 3) are."""
-    start = tracks[:, 0]
-    a, b = tracks[:, TRACK_POINTS // 2] - start, tracks[:, -1] - start
+    a, b = (tracks[:, place] - tracks[:, 0] for place in (TRACK_POINTS // 2, -1))
     normal = np.cross(a, b)
-    squares = [np.sum(one * one, axis=-1, keepdims=True) for one in (a, b, normal)]
-    toward = squares[0] * np.cross(b, normal) + squares[1] * np.cross(normal, a)
-    return np.asarray(start + toward / (2.0 * squares[2]))
+    aa, bb, nn = (np.sum(one * one, axis=-1, keepdims=True) for one in (a, b, normal))
+    return np.asarray(tracks[:, 0] + (aa * np.cross(b, normal) + bb * np.cross(normal, a)) / (2.0 * nn))
 
 
 def outline(points: Array) -> Array:
@@ -185,9 +174,3 @@ def outline(points: Array) -> Array:
     if extents[1] < FLAT * extents[0]:
         return points[np.argsort(away @ u)[[0, -1]]]
     return np.asarray(points[ConvexHull(np.stack([away @ u, away @ v], axis=-1)).vertices])
-
-
-def _thickness(points: Array, dimensions: int = 2) -> float:
-    """How far points (n, 3) are from being in a plane, or a line, as a share of their extent."""
-    extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return float(extents[dimensions] / extents[0])

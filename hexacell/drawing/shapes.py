@@ -1,10 +1,8 @@
-"""What every picture is made of: lines, surfaces, balls and labels in space, each with a role."""
-
-from __future__ import annotations
+"""What every picture is made of: lines, arrows, surfaces, balls and words in space, each with a role."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from enum import StrEnum
+from enum import StrEnum, auto
 
 import numpy as np
 
@@ -18,17 +16,17 @@ class Role(StrEnum):
     errors, and a geometry, before and after a calibration.
     """
 
-    BASE = "base"
-    RAIL = "rail"
-    DRIVE = "drive"
-    LEG = "leg"
-    PLATFORM = "platform"
-    BALL = "ball"
-    X = "x"
-    Y = "y"
-    Z = "z"
-    BEFORE = "before"
-    AFTER = "after"
+    BASE = auto()
+    RAIL = auto()
+    DRIVE = auto()
+    LEG = auto()
+    PLATFORM = auto()
+    BALL = auto()
+    X = auto()
+    Y = auto()
+    Z = auto()
+    BEFORE = auto()
+    AFTER = auto()
 
 
 AXIS_ROLES = (Role.X, Role.Y, Role.Z)
@@ -49,69 +47,40 @@ COLOURS = {
 """Each is readable on white and on black; before and after are apart for colour-blind readers too."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Line:
-    """A line through points (m, 3), mm, so many times as wide as its role says; it may end in a head."""
+Form = StrEnum("Form", ["LINE", "ARROW", "SURFACE", "BALL", "WORD"])
+"""What a shape is."""
 
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shape:
+    """One thing in space.
+
+    Attributes:
+        points: (m, 3), mm: along a line, corners of a flat surface, the centre of a ball. A word is about
+            its only point, or begins at the first of two, away from the other.
+        size: radius of a ball, mm; how many times as wide as others of its role a line is.
+        text: the word.
+    """
+
+    form: Form
     role: Role
     points: Array
-    has_head: bool = False
-    weight: float = 1.0
+    size: float = 1.0
+    text: str = ""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Surface:
-    """A flat surface with the corners (m, 3), mm."""
-
-    role: Role
-    points: Array
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Ball:
-    """A ball or the ball of a joint, about a centre (1, 3), mm."""
-
-    role: Role
-    points: Array
-    radius: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Label:
-    """A short text about a place (1, 3), mm; or at the first of two (2, 3), away from the other."""
-
-    role: Role
-    points: Array
-    text: str
-
-
-Shape = Line | Surface | Ball | Label
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Scene:
-    """Shapes that are seen together."""
-
-    shapes: tuple[Shape, ...]
-
-    def __add__(self, others: Scene) -> Scene:
-        return Scene(self.shapes + others.shapes)
-
-    @property
-    def points(self) -> Array:
-        """All points (n, 3), mm, that a picture must show."""
-        return np.concatenate([shape.points for shape in self.shapes])
+Scene = tuple[Shape, ...]
+"""Shapes that are seen together."""
 
 
 def arrows(role: Role, starts: Array, vectors: Array) -> Scene:
     """A vector (n, 3), as long as it is to be drawn, from each of n points (n, 3), mm."""
-    pairs = zip(starts, vectors, strict=True)
-    return Scene(tuple(Line(role, np.stack([at, at + along]), has_head=True) for at, along in pairs))
+    return tuple(Shape(Form.ARROW, role, ends) for ends in np.stack([starts, starts + vectors], axis=1))
 
 
 def enlargement(vectors: Iterable[Array], longest: float) -> float:
     """The round factor, from 1, at which the longest of some vectors (n, 3) is drawn at most that long."""
-    largest = max((float(np.linalg.norm(one, axis=-1).max(initial=0.0)) for one in vectors), default=0.0)
+    largest = max((float(np.linalg.norm(one, axis=-1).max()) for one in vectors), default=0.0)
     if largest == 0.0 or longest <= largest:
         return 1.0
     power = 10.0 ** np.floor(np.log10(longest / largest))

@@ -5,14 +5,15 @@ import numpy as np
 from hexacell.drawing.robot_scene import robot_scene
 from hexacell.drawing.shapes import Role, arrows, enlargement
 from hexacell.drawing.svg import svg_of
-from hexacell.services.robot_view import Deviations, RobotView
+from hexacell.services.robot_view import RobotView
 
 WORDS = {Role.BEFORE: "as found (brown)", Role.AFTER: "as left (blue)"}
 
 
 def robot_picture(view: RobotView) -> tuple[str, str]:
     """The robot at its first pose with the errors of held-out poses, as SVG; and that in words."""
-    pose, shown = view.poses[0], _compared(view)
+    pose = view.poses[0]
+    shown = [one for one in view.measured if one.name != "records"] or view.measured
     scene = robot_scene(view.robot, pose)
     caption = f"The robot at {pose}: legs 1 to 6, the ball between its gauges x, y and z, the base frame."
     if shown:
@@ -24,9 +25,3 @@ def robot_picture(view: RobotView) -> tuple[str, str]:
         )
         caption += f" Arrows: where the ball was instead, {factor:g} times as far: {sides}."
     return svg_of(scene, view.title, caption), caption
-
-
-def _compared(view: RobotView) -> list[Deviations]:
-    """Those of the same poses before and after; all records where no pose was held out."""
-    held_out = [one for one in view.measured if one.name != "records"]
-    return held_out or list(view.measured)

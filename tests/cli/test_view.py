@@ -35,7 +35,7 @@ document.getElementById("robot").on("plotly_animated", () => {
   });
 });
 const at_once = {mode: "immediate", frame: {duration: 0, redraw: true}, transition: {duration: 0}};
-Plotly.animate("robot", ["2"], at_once);
+Plotly.animate("robot", ["3"], at_once);
 </script>"""
 """Put into a copy of the page: what it complains of, and what it shows after a change of the pose."""
 

@@ -8,7 +8,7 @@ import pytest
 
 from hexacell.drawing.braille import braille_lines
 from hexacell.drawing.camera import Camera
-from hexacell.drawing.shapes import Ball, Label, Line, Role, Scene, Surface, arrows
+from hexacell.drawing.shapes import Form, Role, Shape, arrows
 from hexacell.drawing.svg import svg_of
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -16,15 +16,16 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 def test_a_camera_shows_all_points_as_large_as_the_frame_allows(any_robot) -> None:
     camera = Camera.fitted(any_robot.scene, (300.0, 200.0), 10.0)
-    places = camera.places(any_robot.scene.points)
+    places = np.concatenate([camera.places(one.points) for one in any_robot.scene])
     assert (places >= 9.999).all()
     assert (places <= [290.001, 190.001]).all()
     assert np.isclose(np.ptp(places, axis=0), [280.0, 180.0]).any()
 
 
 def test_the_axes_are_seen_as_by_somebody_who_stands_there() -> None:
-    unit = Scene((Line(Role.X, np.concatenate([np.zeros((1, 3)), np.eye(3)])),))
-    origin, x, y, z = Camera.fitted(unit, (100.0, 100.0), 0.0, (-90.0, 0.0)).places(unit.shapes[0].points)
+    corners = np.concatenate([np.zeros((1, 3)), np.eye(3)])
+    camera = Camera.fitted((Shape(Form.LINE, Role.X, corners),), (100.0, 100.0), 0.0, (-90.0, 0.0))
+    origin, x, y, z = camera.places(corners)
     assert x[0] > origin[0]
     assert np.allclose(y, origin)  # he looks along it
     assert z[1] < origin[1]  # the frame counts downward
@@ -32,8 +33,9 @@ def test_the_axes_are_seen_as_by_somebody_who_stands_there() -> None:
 
 def test_what_is_nearer_covers_what_is_behind_but_no_word_and_no_error() -> None:
     far, near = np.array([[0.0, 5.0, 0.0], [1.0, 5.0, 0.0]]), np.array([[0.0, -5.0, 0.0], [1.0, -5.0, 0.0]])
-    word = Label(Role.LEG, far[:1], "1")
-    scene = Scene((word, Line(Role.LEG, near), Line(Role.LEG, far))) + arrows(Role.AFTER, far[:1], far[1:])
+    word = Shape(Form.WORD, Role.LEG, far[:1], text="1")
+    lines = [Shape(Form.LINE, Role.LEG, ends) for ends in (near, far)]
+    scene = (word, *lines, *arrows(Role.AFTER, far[:1], far[1:]))
     ordered = Camera.fitted(scene, (10.0, 10.0), 0.0).back_to_front(scene)
     assert [np.array_equal(one.points, near) for one in ordered[:2]] == [False, True]
     assert {ordered[2].role, ordered[3].role} == {Role.LEG, Role.AFTER}
@@ -76,13 +78,3 @@ def test_characters_fill_the_lines_and_all_legs_keep_their_numbers(any_robot, wi
         legs = "".join(run.text for line in lines for run in line if run.role is Role.LEG)
         assert set(re.sub(r"[^\d]", "", legs)) == set("123456")
     assert all((run.role is None) == (not run.text.strip()) for line in lines for run in line)
-
-
-def test_dots_are_where_the_lines_are() -> None:
-    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 1.0], [0.0, 0.0, 1.0]])
-    scene = Scene((Surface(Role.BASE, corners), Ball(Role.LEG, corners.mean(axis=0)[None], 0.1)))
-    lines = braille_lines(scene, 6, 3, (-90.0, 0.0))
-    texts = ["".join(run.text for run in line) for line in lines]
-    assert [text[1:-1].strip("\u2800 ") != "" for text in texts] == [True, True, True]
-    assert (texts[0][2], texts[2][2]) != (" ", " ")
-    assert [run.role for run in lines[1] if run.role is Role.LEG] == [Role.LEG]

@@ -5,25 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.drawing.robot_scene import crank_centres, outline, robot_scene
-from hexacell.drawing.shapes import AXIS_ROLES, Ball, Label, Line, Role, Scene, Surface, arrows, enlargement
+from hexacell.drawing.robot_scene import crank_centres, robot_scene
+from hexacell.drawing.shapes import AXIS_ROLES, Form, Role, Scene, arrows, enlargement
 from hexacell.errors import ReachError
 from hexacell.kinematics.pose import Pose
 
 
-def lines(scene: Scene, role: Role, *, has_head: bool = False) -> list[np.ndarray]:
-    found = (one for one in scene.shapes if isinstance(one, Line))
-    return [one.points for one in found if one.role is role and one.has_head == has_head]
+def lines(scene: Scene, role: Role, form: Form = Form.LINE) -> list[np.ndarray]:
+    return [one.points for one in scene if (one.role, one.form) == (role, form)]
 
 
 def balls(scene: Scene, role: Role) -> np.ndarray:
-    return np.array([one.points[0] for one in scene.shapes if isinstance(one, Ball) and one.role is role])
+    return np.concatenate(lines(scene, role, Form.BALL))
 
 
 def test_every_robot_has_six_numbered_legs_from_its_drives_to_its_platform(any_robot) -> None:
     scene, pose = any_robot.scene, any_robot.pose
     legs = lines(scene, Role.LEG)
-    numbers = [one for one in scene.shapes if isinstance(one, Label) and one.role is Role.LEG]
+    numbers = [one for one in scene if one.form is Form.WORD and one.role is Role.LEG]
     assert [one.text for one in numbers] == list("123456")
     for leg, number, drive, joint in zip(
         legs, numbers, balls(scene, Role.DRIVE), balls(scene, Role.PLATFORM), strict=True
@@ -32,8 +31,8 @@ def test_every_robot_has_six_numbered_legs_from_its_drives_to_its_platform(any_r
         apart = [np.linalg.norm(number.points[0] - end) for end in leg]
         assert sum(apart) == pytest.approx(np.linalg.norm(leg[1] - leg[0]))
     assert np.allclose(balls(scene, Role.BALL), pose.position)
-    assert np.isfinite(scene.points).all()
-    assert any(isinstance(one, Surface) and one.role is Role.BASE for one in scene.shapes)
+    assert all(np.isfinite(one.points).all() for one in scene)
+    assert lines(scene, Role.BASE, Form.SURFACE)
 
 
 def test_legs_of_fixed_length_have_the_length_of_the_geometry_and_sliders_are_on_rails(hexaglide) -> None:
@@ -91,14 +90,5 @@ def test_errors_are_enlarged_by_a_round_factor_that_keeps_them_short() -> None:
     assert enlargement([vectors], 0.1) == 1.0
     assert enlargement([np.zeros((1, 3))], 100.0) == enlargement([], 100.0) == 1.0
     starts = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
-    ends = [line[1] for line in lines(arrows(Role.AFTER, starts, vectors), Role.AFTER, has_head=True)]
+    ends = [line[1] for line in lines(arrows(Role.AFTER, starts, vectors), Role.AFTER, Form.ARROW)]
     assert np.allclose(ends, starts + vectors)
-
-
-def test_the_outline_goes_once_around_the_outer_points_of_a_plane() -> None:
-    square = np.array([[0.0, 0.0, 1.0], [2.0, 2.0, 1.0], [2.0, 0.0, 1.0], [0.0, 2.0, 1.0], [1.0, 1.0, 1.0]])
-    corners = outline(square)
-    sides = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=-1)
-    assert sides.tolist() == pytest.approx([2.0] * 4)
-    line = np.outer([0.0, 3.0, 1.0], [1.0, 0.0, 0.0])
-    assert sorted(outline(line)[:, 0].tolist()) == [0.0, 3.0]

@@ -196,7 +196,8 @@ def test_a_forged_journal_is_told(typed_here, run) -> None:
 def test_the_first_page_has_the_robot_with_its_errors_as_found_and_as_left(typed_here, run) -> None:
     assert typed_here("report", run).code == 0
     page = (run / "report.html").read_text()
-    first = page[: page.index("<h2>As found and as left</h2>")]
+    first = page[page.index('<figure class="robot">') :]
+    first = first[: first.index("</figure>")]
     shown = text_of(first)
     assert re.search(
         r"The robot at X.*, 20 times as far: as found \(brown\), up to 5\.\d+ mm and as left", shown

@@ -95,7 +95,7 @@ class Report:
     summary: tuple[Chapter, ...]
     chapters: tuple[Chapter, ...]
     is_simulated: bool = False
-    robot_svg: str = ""
+    robot: Picture | None = None
 
 
 def rendered(

@@ -5,12 +5,15 @@ from dataclasses import dataclass
 
 from drivers.interfaces import DeviceIdentity
 from hexacell.cell.fields import CertificateSettings
+from hexacell.errors import ReachError
 from hexacell.lengths import MM
 from hexacell.services.history.reported_run import ReportedRun
+from hexacell.services.robot_view import view_of_run
 from hexacell.text.measured_noise import measured_noise_sentences, reversal_sentence, worsening_sentence
 from hexacell.text.report import results, statement
-from hexacell.text.report.pages import Chapter, Facts, Paragraph, Report, Table, Tone
+from hexacell.text.report.pages import Chapter, Facts, Paragraph, Picture, Report, Table, Tone
 from hexacell.text.report.statement import NOT_STATED
+from hexacell.text.robot_picture import robot_picture
 from procedures.run.readings import temperatures_shown
 
 TITLES = {
@@ -21,10 +24,8 @@ TITLES = {
 }
 
 
-def report_of(run: ReportedRun, earlier: ReportedRun | None = None, robot_svg: str = "") -> Report:
+def report_of(run: ReportedRun, earlier: ReportedRun | None = None) -> Report:
     """The report of a run, the verdict first; with what has changed since an ``earlier`` run, if named.
-
-    ``robot_svg`` is a drawing of the robot for the first page.
 
     Raises:
         UsageError: the two cannot be compared.
@@ -57,8 +58,16 @@ def report_of(run: ReportedRun, earlier: ReportedRun | None = None, robot_svg: s
         summary=statement.summary_of(run, "; ".join(map(": ".join, numbers))),
         chapters=tuple(chapter for chapter in chapters if chapter is not None),
         is_simulated=run.settings.simulation is not None,
-        robot_svg=robot_svg,
+        robot=_robot(run),
     )
+
+
+def _robot(run: ReportedRun) -> Picture | None:
+    """The robot with what was measured; None where its geometry reaches none of its poses."""
+    try:
+        return Picture(*robot_picture(view_of_run(run)))
+    except ReachError:
+        return None
 
 
 def conditions_chapter(run: ReportedRun) -> Chapter:

@@ -81,7 +81,7 @@ def test_hostile_texts_stay_texts_and_both_pages_need_nothing_else() -> None:
 
 def test_a_simulated_robot_is_named_on_every_page_and_a_real_one_never() -> None:
     real = report("plain")
-    simulated = replace(real, is_simulated=True, robot_svg=SVG)
+    simulated = replace(real, is_simulated=True, robot=pages.Picture(SVG, "the robot"))
     assert "SIMULATED" in read_text(pages.html_of(simulated))
     assert "SIMULATED" not in read_text(pages.html_of(real))
     assert pages.html_of(simulated).count(SVG) == pages.html_of(real).count(SVG) + 1

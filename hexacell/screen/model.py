@@ -16,6 +16,7 @@ from hexacell.screen.preferences import ONCE, RESUME, WITH_LENGTH, ScreenAction
 from hexacell.screen.watching import DeviceWatcher, RunFollower
 from hexacell.screen.workplace import Workplace
 from hexacell.services.history.run_index import PastRun
+from hexacell.services.robot_view import first_scene
 from hexacell.text.config_changes import RELOAD, versions_text
 from hexacell.text.screens import banner, devices, past_runs, reviewing
 from hexacell.text.screens.cell_facts import cell_facts
@@ -61,6 +62,7 @@ class ScreenModel:
         self._run_is_over = asyncio.Event()
         self._is_checking, self._is_starting, self._is_ready = False, False, False
         self._is_unfolded = False
+        self._scene = first_scene(workplace.cell)
         self._checked: tuple[ChecklistItem, ...] | None = None
         self.runs: tuple[PastRun, ...] | None = None
         self._compared: tuple[str, ...] = ()
@@ -151,7 +153,8 @@ class ScreenModel:
             case "cell":
                 warnings = [(one, Urgency.ATTENTION) for one in self._workplace.warnings]
                 facts = ([*warnings, *((one, Urgency.CALM) for one in cell_facts(cell))],)
-                return {"cards": (devices.device_cards(*self._live()),), "facts": facts}
+                cards = (devices.device_cards(*self._live()),)
+                return {"cards": cards, "facts": facts, "robot": (self._scene,)}
             case "preflight":
                 if (checked := self._checked) is None:
                     checked = checked_items(Mark.BUSY if self._is_checking else Mark.OPEN)
@@ -314,7 +317,7 @@ class ScreenModel:
             case ScreenAction.MEASURE_AGAIN if at is not None:
                 await self.run.give(MeasureAgain(at))
             case ScreenAction.MEASURE_AGAIN:
-                raise UsageError("No point is being measured now")
+                raise UsageError("no point is being measured now")
             case ScreenAction.ABORT:
                 await self.run.give(Abort())
             case ScreenAction.TAKE_CONTROL if connection is not None:

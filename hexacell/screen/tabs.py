@@ -14,6 +14,7 @@ from textual.screen import Screen
 from hexacell.screen import widgets
 from hexacell.screen.plot_panel import PlotPanel
 from hexacell.screen.preferences import WITH_LENGTH
+from hexacell.screen.robot_panel import RobotPanel
 from hexacell.screen.widgets import titled
 
 if TYPE_CHECKING:
@@ -49,14 +50,16 @@ class TabScreen(Screen[None]):
 
 
 class CellScreen(TabScreen):
-    """A card for each device, and what the cell file states in a few lines."""
+    """A card for each device, what the cell file states in a few lines, and a drawing of the robot."""
 
     TAB = "cell"
     BINDINGS: ClassVar[list[BindingType]] = [Binding("f", "app.cell_file", "Cell file")]
 
     def _parts(self) -> ComposeResult:
         yield widgets.CardGrid(id="cards")
-        yield titled(widgets.TextList(id="facts"), "Cell")
+        with Horizontal(id="about"):
+            yield titled(widgets.TextList(id="facts"), "Cell")
+            yield titled(RobotPanel(id="robot"), "Robot at its first pose")
 
 
 class PreflightScreen(TabScreen):

@@ -6,8 +6,9 @@ import numpy as np
 
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
-from hexacell.drawing.robot_scene import DrawnRobot
-from hexacell.drawing.shapes import Role
+from hexacell.drawing.robot_scene import DrawnRobot, robot_scene
+from hexacell.drawing.shapes import Role, Scene
+from hexacell.errors import HexacellError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import Pose, PoseBatch
@@ -65,6 +66,15 @@ def view_of_cell(cell: Cell) -> RobotView:
     """The robot of a cell as its controller knows it now; raises ``FileError`` if its config is absent."""
     robot = drawn_robot(robot_of(cell), cell.settings)
     return RobotView(cell.settings.name, robot, _poses(robot, cell.settings))
+
+
+def first_scene(cell: Cell) -> Scene | None:
+    """The robot of a cell at the first of its poses; None where it cannot be drawn."""
+    try:
+        view = view_of_cell(cell)
+        return robot_scene(view.robot, view.poses[0])
+    except HexacellError:
+        return None
 
 
 def view_of_run(run: ReportedRun) -> RobotView:

@@ -2,29 +2,29 @@
 
 SCREEN_HELP = {
     "cell": """\
-What is attached shows here as it is now: each gauge with its reading, unit, age and noise, the six \
-encoders, and the controller. Below is what the cell file says; behind each value is its line in the \
-file, or "default" where the file does not state it.
+What is attached shows here as it is now, a card each: gauges with reading, place in their travel, noise \
+and age, the six encoders, the controller, the stop line. Below are the cell in a few lines and the robot. \
+f shows the whole cell file; behind each value is its line, or "default" where the file does not state it.
 
 A device that does not answer says why. Mend that before you go to 2 Preflight.""",
     "preflight": """\
 Everything that must hold before the robot moves, one line each:
-  ok  it holds      NO  it does not, with what to do
-  ..  being looked at      --  not looked at yet
+  ✓ it holds      ✗ it does not, with what to do
+  … being looked at      · not looked at yet
 Enter looks at all of it; nothing moves. v tries the plan on simulated robots and says how many records \
 and minutes it takes and how accurate the robot will be. x shows its poses: x there excludes, in the \
 cell file, what the robot must not be sent to. s starts a calibration, k a check that changes nothing, K \
 the quick level, which corrects with fewer records what has drifted since the last result, r goes on \
 with the latest run that was interrupted. In a cell with a fixture of known length, l checks the length \
 scale, and L calibrates and checks it before the verdict. Everything is looked at again before the first \
-move.""",
+move. i shows which devices answered.""",
     "measure": """\
-What happens now, what is next, how long it takes, and how to stop. Each gauge shows its reading, the \
-deviation d from the zero of the set, the age of the reading, its noise, and where its plunger stands in \
-its travel. A record lands with its residual: what was measured less what was predicted, the largest of \
-x, y and z, and how many sigma that is. More than 4 sigma deserves a look.
+What happens now, what is next, how long it takes with the people who place the gauges, and how to stop. \
+Each gauge shows its deviation from the reference, and where its plunger stands in its travel. A record \
+lands with what it is off: measured less predicted, the largest of x, y and z, and how many sigma that \
+is. More than 4 sigma is marked and deserves a look.
 
-The picture is the predicted error at the worst task pose; it falls record by record to the target.""",
+The picture is the predicted error at the worst task pose; it falls record by record to the limit.""",
     "review": """\
 The verdict first, with what it holds for and what was not checked. Then each parameter: old, new, \
 change, its standard deviation sigma, and what that means. Before and after are compared at poses that \

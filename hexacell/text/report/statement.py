@@ -10,6 +10,7 @@ from math import hypot
 
 from hexacell.lengths import MM, unit_of
 from hexacell.services.history.reported_run import ReportedRun
+from hexacell.storage.atomic_files import decode_utf8, read_bytes
 from hexacell.text.parameters import rows_of_run
 from hexacell.text.report.charts import Mark, chart, error_card
 from hexacell.text.report.pages import TEMPLATES, Chapter, Facts, Paragraph, Picture, Table, Tone
@@ -139,7 +140,7 @@ def _gauges_svg() -> str:
     """The part of the drawing of the documentation that shows the gauges; its style is for it alone."""
     packaged = TEMPLATES / "gauges.svg"
     path = packaged if packaged.is_file() else TEMPLATES.parents[2] / "docs" / "gauges.svg"
-    drawing = re.sub('(?s)<g id="robot">.*?</g>', "", path.read_text(encoding="utf-8"))
+    drawing = re.sub('(?s)<g id="robot">.*?</g>', "", decode_utf8(read_bytes(path), path))
     drawing = drawing.replace('viewBox="0 0 1000 560"', 'class="gauges" viewBox="540 10 460 540"')
     return drawing.replace("<style>text{", "<style>.gauges text{")
 

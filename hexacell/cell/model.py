@@ -77,6 +77,7 @@ class CellSettings(Section):
         (), max_length=operation.MOST_NOTIFICATIONS
     )
     opcua: operation.OpcUaSettings | None = None
+    screen: operation.ScreenSettings = operation.ScreenSettings()
     task: measuring.TaskSettings = measuring.TaskSettings()
     report: operation.ReportSettings = operation.ReportSettings()
     simulation: SimulationSettings | None = None

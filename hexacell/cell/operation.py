@@ -68,6 +68,18 @@ class OpcUaSettings(Section):
     )
 
 
+class ScreenSettings(Section):
+    """The technician's screen in a browser, as ``hexacell tui --serve`` serves it."""
+
+    password_file: Text | None = key(
+        None,
+        "TOML file with user and password of who may use it, relative to the cell file, which others must "
+        "not be able to read; without one it is for this user on this computer alone. HEXACELL_SCREEN_USER "
+        "and HEXACELL_SCREEN_PASSWORD in the environment take precedence",
+        min_length=1,
+    )
+
+
 class ReportSettings(Section):
     """What a report of a run says beside what was measured; all of it may be left out."""
 

@@ -4,9 +4,11 @@ A cell file is copied, shown and kept with every run, so a password should not b
 that has one counts.
 """
 
+import hmac
 import os
 import stat
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from pydantic import SecretStr
@@ -101,6 +103,44 @@ def stated_secrets(
         if value:
             found[name] = SecretStr(value)
     return found
+
+
+class LoginFile(Section):
+    """The content of the ``password_file`` of a server."""
+
+    user: Password
+    password: Password
+
+
+@dataclass(frozen=True, slots=True)
+class Login:
+    """The one name and password that a server lets in."""
+
+    user: str = field(repr=False)
+    password: str = field(repr=False)
+
+    def admits(self, user: str, password: str) -> bool:
+        """Whether these are they; the answer takes as long for any wrong ones."""
+        is_user = hmac.compare_digest(user.encode(), self.user.encode())
+        is_password = hmac.compare_digest(password.encode(), self.password.encode())
+        return is_user and is_password
+
+
+def stated_login(file: str | None, folder: Path, variables: Mapping[str, str]) -> Login | None:
+    """Who may log in at a server, if anybody is named.
+
+    Args:
+        file: its ``password_file``, if any.
+        folder: has the cell file.
+        variables: the variables of the environment with ``user`` and ``password``.
+
+    Raises:
+        FileError: see :func:`private_content`.
+        UsageError: a variable of the environment has control characters or is too long.
+    """
+    found = stated_secrets(None if file is None else folder / file, LoginFile, variables, os.environ)
+    texts = {name: value.get_secret_value() for name, value in found.items()}
+    return Login(**texts) if len(texts) == len(variables) else None
 
 
 def private_content(path: Path, model: type[SectionType]) -> SectionType:

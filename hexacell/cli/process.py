@@ -35,7 +35,7 @@ STOP_SIGNALS: tuple[int, ...] = tuple(
 Unhandled, each ends the process, and a robot would go on with its move, unwatched. Faults are left alone.
 """
 
-OVER_A_SOCKET = {"tui.main", "host.main"}
+OVER_A_SOCKET = {"tui.main", "tui.page", "host.main"}
 """Commands that run, or reach, a run in another process."""
 
 

@@ -8,12 +8,11 @@ types of that specification, its structured data types and its methods among the
 from __future__ import annotations
 
 import asyncio
-import hmac
 import logging
 import os
 from collections import deque
 from collections.abc import Callable
-from dataclasses import astuple, dataclass, field
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,10 +24,9 @@ from cryptography import x509
 from cryptography.hazmat.primitives.serialization import Encoding
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
-from hexacell.cell.fields import Password, Section
 from hexacell.cell.loader import Cell
 from hexacell.cell.operation import OpcUaSettings
-from hexacell.cell.passwords import stated_secrets
+from hexacell.cell.passwords import Login, stated_login
 from hexacell.errors import DeviceError, UsageError
 from hexacell.result_server.published_result import SEVERITIES, NewResults, PublishedResult
 from hexacell.storage import atomic_files
@@ -65,19 +63,11 @@ LOGIN_S = 5.0
 """So long a connection may last without a login; asyncua keeps all that is sent on it."""
 
 
-class ReaderFile(Section):
-    """The content of the server's ``password_file``."""
-
-    user: Password
-    password: Password
-
-
 @dataclass(frozen=True, slots=True)
 class Reader:
-    """Who may read; anybody if there is no name."""
+    """Who may read; anybody without a login."""
 
-    user: str = field(default="", repr=False)
-    password: str = field(default="", repr=False)
+    login: Login | None = None
 
     def get_user(
         self,
@@ -87,10 +77,8 @@ class Reader:
         certificate: object = None,  # noqa: ARG002 - likewise
     ) -> User | None:
         """Whoever logs in, who can change nothing; None if refused, as slowly for any wrong password."""
-        given = password if isinstance(password, bytes) else (password or "").encode()
-        same_user = hmac.compare_digest((username or "").encode(), self.user.encode())
-        same_password = hmac.compare_digest(given, self.password.encode())
-        is_reader = same_user and same_password if self.user else username is None
+        given = password.decode(errors="replace") if isinstance(password, bytes) else password or ""
+        is_reader = self.login.admits(username or "", given) if self.login else username is None
         return User(role=UserRole.User) if is_reader else None
 
 
@@ -101,12 +89,9 @@ def allowed_reader(settings: OpcUaSettings, folder: Path) -> Reader:
         FileError: the password file cannot be read, or others can read or change it.
         UsageError: nobody is named, and the cell file does not let anybody in; or a variable is too long.
     """
-    file = None if settings.password_file is None else folder / settings.password_file
-    found = stated_secrets(file, ReaderFile, VARIABLES, os.environ)
-    if len(found) == len(VARIABLES):
-        return Reader(**{name: value.get_secret_value() for name, value in found.items()})
-    if settings.anonymous:
-        return Reader()
+    login = stated_login(settings.password_file, folder, VARIABLES)
+    if login or settings.anonymous:
+        return Reader(login)
     raise UsageError(
         "nobody may read the results",
         subject="[opcua]",
@@ -233,7 +218,7 @@ async def _server(settings: OpcUaSettings, reader: Reader, folder: Path) -> Serv
     server.set_server_name("hexacell results")
     await server.set_application_uri(URI)
     server.set_security_policy([ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt])
-    server.set_identity_tokens([ua.UserNameIdentityToken if reader.user else ua.AnonymousIdentityToken])
+    server.set_identity_tokens([ua.UserNameIdentityToken if reader.login else ua.AnonymousIdentityToken])
     await server.load_certificate(certificate)
     await server.load_private_key(key)
     return server

@@ -53,7 +53,23 @@ def _run(commands: Any) -> None:  # noqa: ANN401
 
 
 def _tui(commands: Any) -> None:  # noqa: ANN401
-    add_command(commands, "tui", "the technician's screen: measure, review, approve, roll back").add_cell()
+    parser = add_command(commands, "tui", "the technician's screen: measure, review, approve, roll back")
+    parser.add_cell()
+    parser.add_argument(
+        "--serve",
+        nargs="?",
+        const="127.0.0.1:8000",
+        metavar="ADDRESS:PORT",
+        help="show it in browsers, at this address of this computer (default: %(const)s), until "
+        "interrupted; for other computers a password is needed",
+    )
+
+
+def _page(commands: Any) -> None:  # noqa: ANN401
+    """The process of a page of ``tui --serve``. People never type it, so the help does not list it."""
+    parser = commands.add_parser("page")
+    parser.set_defaults(target="tui.page")
+    parser.add_cell()
 
 
 def _length(commands: Any) -> None:  # noqa: ANN401
@@ -311,7 +327,7 @@ def _view(commands: Any) -> None:  # noqa: ANN401
 
 
 COMMANDS = (
-    *(_demo, _run, _tui, _length, _preflight, _simulate, _host, _next, _fit, _replay),
+    *(_demo, _run, _tui, _page, _length, _preflight, _simulate, _host, _next, _fit, _replay),
     *(_apply, _rollback, _history, _report, _view),
     *(_devices, _schedule, _status, _notify, _serve, _cell, _completion),
     _studies,

@@ -1,13 +1,15 @@
-"""``hexacell serve`` and ``simulate``: results by OPC UA, or a simulated cell, for other processes."""
+"""``hexacell serve``, ``simulate`` and ``tui --serve``: results, a simulated cell, the screen."""
 
 import argparse
 import asyncio
 from collections.abc import Coroutine
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from hexacell.cell.loader import Cell
-from hexacell.cell.operation import OpcUaSettings
+from hexacell.cell.operation import OpcUaSettings, ScreenSettings
+from hexacell.cell.passwords import Login, stated_login
 from hexacell.cli.commands.cell import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
@@ -49,6 +51,34 @@ async def _serve_cell(cell: Cell, options: argparse.Namespace) -> None:
             options.output.write(SERVED_MARK + text.encode())
         _announce("serving")
         await asyncio.Event().wait()
+
+
+SCREEN_VARIABLES = {"user": "HEXACELL_SCREEN_USER", "password": "HEXACELL_SCREEN_PASSWORD"}
+
+
+def screen(options: argparse.Namespace, console: Console) -> ExitCode:
+    """Serve until interrupted; without a cell file the pages have the assistant that makes one."""
+    path: Path = options.cell
+    settings = cell_at(path, console).settings.screen if path.exists() else ScreenSettings()
+    login = stated_login(settings.password_file, path.parent, SCREEN_VARIABLES)
+    return _until_stopped(_serve_screen(options, login, console))
+
+
+async def _serve_screen(options: argparse.Namespace, login: Login | None, console: Console) -> None:
+    try:
+        from hexacell.screen_server.server import serve_screen  # noqa: PLC0415 - an optional extra
+    except ImportError as error:
+        raise UsageError("textual-serve is not installed", action="Install hexacell[serve]") from error
+
+    def ready(address: str, is_local: bool) -> None:
+        if not is_local:
+            console.warn(
+                f"who reaches {address} with the password can move the robot, and nothing is encrypted. "
+                "In a network of others serve 127.0.0.1, and reach it by `ssh -L`"
+            )
+        _announce(f"serving {address}")
+
+    await serve_screen(options.serve, options.cell, login, ready)
 
 
 def _until_stopped(serving: Coroutine[Any, Any, None]) -> ExitCode:

@@ -21,16 +21,25 @@ if TYPE_CHECKING:
     from hexacell.screen.model import ScreenModel
 
 
-def main(options: argparse.Namespace, _: Console) -> ExitCode:
-    """Show the screen until the person leaves it; then the process ends at once.
+def main(options: argparse.Namespace, console: Console) -> ExitCode:
+    """Show the screen until the person leaves it, or serve it; then the process ends at once.
 
     Raises ``UsageError`` without a terminal, ``FileError`` if the key map cannot be read.
     """
+    if options.serve is not None:
+        from hexacell.cli.commands.serve import screen  # noqa: PLC0415 - slow, and only of use here
+
+        return screen(options, console)
     action = "Use `hexacell run`, which asks line by line"
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise UsageError("the screen needs a terminal", action=action)
     if os.environ.get("TERM") == "dumb":
         raise UsageError("this terminal cannot draw a screen (TERM is dumb)", action=action)
+    return page(options, console)
+
+
+def page(options: argparse.Namespace, _: Console) -> ExitCode:
+    """Show the screen at this terminal, or to the server that has started this process for a browser."""
     end_with_terminal(sys.stdin.fileno())
     path: Path = options.cell
     app = TechnicianApp(
@@ -57,7 +66,7 @@ def _model(path: Path) -> ScreenModel:
 
 
 def end_with_terminal(terminal: int) -> None:
-    """End this process as soon as a terminal is gone, whether or not a signal says so.
+    """End this process as soon as a terminal, or a server in its place, is gone, signal or not.
 
     What is drawn then can be written nowhere: Textual's queue of it fills, and the process would wait for
     ever. Its run notices that nobody is there, and pauses.

@@ -24,7 +24,7 @@ from procedures.journal.journal import LONGEST_LINE, decode
 from procedures.run.state import RunState
 from procedures.steps.events import RunStarted
 
-OF_NO_RESULT = {"name", "report", "archive", "notifications", "opcua", "unattended"}
+OF_NO_RESULT = {"name", "report", "archive", "notifications", "opcua", "screen", "unattended"}
 """Parts of a cell file on which no result depends, as none does on comments and order: all others count."""
 
 

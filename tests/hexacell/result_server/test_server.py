@@ -22,6 +22,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from hexacell.cell.loader import Cell
 from hexacell.cell.operation import OpcUaSettings
+from hexacell.cell.passwords import Login
 from hexacell.errors import DeviceError, FileError, UsageError
 from hexacell.result_server import server
 from hexacell.result_server import server as server_module
@@ -248,7 +249,7 @@ async def test_a_password_that_others_can_read_and_a_port_that_is_taken_are_refu
         settings = OpcUaSettings(port=taken.getsockname()[1])
         with pytest.raises(DeviceError, match="cannot be served"):
             await server.serve_results(cell, settings, lambda _: None, lambda _: None)
-    assert server.allowed_reader(settings, cell.path.parent) == server.Reader(USER, PASSWORD), (
+    assert server.allowed_reader(settings, cell.path.parent) == server.Reader(Login(USER, PASSWORD)), (
         "of the environment"
     )
     monkeypatch.delenv("HEXACELL_OPCUA_USER")

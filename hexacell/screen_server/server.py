@@ -27,6 +27,7 @@ DEFAULT_PORT = 8000
 MOST_PAGES = 10
 HEARTBEAT_S = 5.0
 """A browser that says nothing for half as long after so long a time is gone, and its process ends."""
+CLOSING_S = 2.0
 
 PAGE = Template(Path(__file__).with_name("page.html").read_text(encoding="utf-8"), autoescape=True)
 HEADERS = {
@@ -79,7 +80,7 @@ class ScreenServer(Server):
     def __init__(self, cell: Path, access: Access) -> None:
         super().__init__("\0".join(python_command("hexacell", "page", "--", str(cell))), title=cell.stem)
         self._access, self._ticket = access, secrets.token_urlsafe()
-        self._pages: set[web.WebSocketResponse] = set()
+        self._pages: dict[web.WebSocketResponse, asyncio.Task[object] | None] = {}
 
     def application(self) -> web.Application:
         """All that is served; nothing of it to whom ``access`` refuses."""
@@ -116,8 +117,8 @@ class ScreenServer(Server):
         """A process of the screen until either side closes."""
         if len(self._pages) >= MOST_PAGES:
             raise web.HTTPServiceUnavailable(text=f"{MOST_PAGES} pages show this screen already.")
-        websocket = web.WebSocketResponse(heartbeat=HEARTBEAT_S)
-        self._pages.add(websocket)
+        websocket = web.WebSocketResponse(heartbeat=HEARTBEAT_S, timeout=CLOSING_S)
+        self._pages[websocket] = asyncio.current_task()
         try:
             await websocket.prepare(request)
             process = PageProcess(
@@ -134,11 +135,13 @@ class ScreenServer(Server):
             finally:
                 await process.stop()
         finally:
-            self._pages.discard(websocket)
+            del self._pages[websocket]
         return websocket
 
     async def _close_pages(self, _: web.Application) -> None:
-        await asyncio.gather(*(page.close(code=WSCloseCode.GOING_AWAY) for page in list(self._pages)))
+        tasks = [task for task in self._pages.values() if task is not None]
+        closing = [page.close(code=WSCloseCode.GOING_AWAY) for page in self._pages]
+        await asyncio.gather(*closing, *tasks, return_exceptions=True)
 
 
 async def serve_screen(

@@ -75,7 +75,8 @@ def serving(tmp_path: Path):
     async def serve(login: Login | None = None) -> AsyncIterator[Served]:
         screen = ScreenServer(tmp_path / "cell.toml", Access(frozenset({"localhost"}), login))
         screen.command = "\0".join([sys.executable, "-c", SCREEN, str(tmp_path / "child")])
-        async with TestServer(screen.application()) as server, ClientSession() as client:
+        server = TestServer(screen.application())
+        async with server, ClientSession() as client:
             yield Served(screen, server, client)
 
     return serve

@@ -35,8 +35,6 @@ HEADERS = {
     "'unsafe-inline'; font-src 'self'; img-src data:; connect-src 'self' ws://{host}; base-uri 'none'; "
     "form-action 'none'; frame-ancestors 'none'",
     "Cross-Origin-Opener-Policy": "same-origin",
-    "Cross-Origin-Resource-Policy": "same-origin",
-    "X-Content-Type-Options": "nosniff",
     "Cache-Control": "no-store",
 }
 
@@ -145,7 +143,7 @@ class ScreenServer(Server):
 
 
 async def serve_screen(
-    place: str, cell: Path, login: Login | None, ready: Callable[[str, bool], None]
+    place: str, cell: Path, login: Login | None, ready: Callable[[str], None], warn: Callable[[str], None]
 ) -> None:
     """Serve until cancelled; the cell file need not be there yet.
 
@@ -153,7 +151,8 @@ async def serve_screen(
         place: address or name of this computer, and port.
         cell: the cell file.
         login: who may use the screen; without one, processes of this user on this computer alone.
-        ready: gets the page's address, and whether it leads nowhere but to this computer.
+        ready: gets a line with the page's address.
+        warn: gets what somebody should know who lets others reach it.
 
     Raises:
         UsageError: the place is none, or others reach it and there is no login.
@@ -179,7 +178,12 @@ async def serve_screen(
         try:
             for host in hosts:
                 await web.TCPSite(runner, host, port).start()
-            ready(f"http://{address.parts.netloc}/", is_local)
+            if not is_local:
+                warn(
+                    f"who reaches {place} with the password can move the robot, and nothing is encrypted. "
+                    "In a network of others serve 127.0.0.1, and reach it by `ssh -L`"
+                )
+            ready(f"serving http://{address.parts.netloc}/")
             await asyncio.Event().wait()
         finally:
             await runner.cleanup()

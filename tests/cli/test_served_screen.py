@@ -104,7 +104,7 @@ def test_for_other_computers_there_is_the_password_of_the_cell(start, cell_folde
     with cell_folder.cell.open("a") as cell:
         cell.write('\n[screen]\npassword_file = "screen.toml"\n')
     process, address = served_at(start, cell_folder.cell, "0.0.0.0")
-    assert "warning: who reaches http://0.0.0.0" in process.err
+    assert "warning: who reaches 0.0.0.0:" in process.err
     with pytest.raises(HTTPError, match="401"):
         urlopen(address)
     known = {"Authorization": f"Basic {b64encode(b'line-7:hidden-password').decode()}"}

@@ -60,7 +60,7 @@ def _tui(commands: Any) -> None:  # noqa: ANN401
         nargs="?",
         const="127.0.0.1:8000",
         metavar="ADDRESS:PORT",
-        help="show it in browsers, at this address of this computer (default: %(const)s), until "
+        help="show it in browsers, at this address of this computer (default: 127.0.0.1:8000), until "
         "interrupted; for other computers a password is needed",
     )
 

@@ -69,16 +69,7 @@ async def _serve_screen(options: argparse.Namespace, login: Login | None, consol
         from hexacell.screen_server.server import serve_screen  # noqa: PLC0415 - an optional extra
     except ImportError as error:
         raise UsageError("textual-serve is not installed", action="Install hexacell[serve]") from error
-
-    def ready(address: str, is_local: bool) -> None:
-        if not is_local:
-            console.warn(
-                f"who reaches {address} with the password can move the robot, and nothing is encrypted. "
-                "In a network of others serve 127.0.0.1, and reach it by `ssh -L`"
-            )
-        _announce(f"serving {address}")
-
-    await serve_screen(options.serve, options.cell, login, ready)
+    await serve_screen(options.serve, options.cell, login, _announce, console.warn)
 
 
 def _until_stopped(serving: Coroutine[Any, Any, None]) -> ExitCode:

@@ -195,7 +195,7 @@ async def test_there_are_not_more_pages_than_a_computer_can_bear(serving, monkey
 @pytest.mark.parametrize("place", ["0.0.0.0:8000", "192.0.2.1", "[::]:8000"])
 async def test_other_computers_need_a_password(place: str) -> None:
     with pytest.raises(UsageError, match="could move the robot"):
-        await serve_screen(place, Path("cell.toml"), None, lambda *_: None)
+        await serve_screen(place, Path("cell.toml"), None, print, print)
 
 
 @pytest.mark.parametrize(
@@ -203,11 +203,11 @@ async def test_other_computers_need_a_password(place: str) -> None:
 )
 async def test_what_is_no_place_is_refused(place: str) -> None:
     with pytest.raises(UsageError, match=r"is no (place|address)"):
-        await serve_screen(place, Path("cell.toml"), LOGIN, lambda *_: None)
+        await serve_screen(place, Path("cell.toml"), LOGIN, print, print)
 
 
 async def test_a_port_that_is_taken_is_named() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         place = f"127.0.0.1:{taken.getsockname()[1]}"
         with pytest.raises(DeviceError, match=f"{place}: cannot be served"):
-            await serve_screen(place, Path("cell.toml"), None, lambda *_: None)
+            await serve_screen(place, Path("cell.toml"), None, print, print)

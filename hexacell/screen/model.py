@@ -261,9 +261,11 @@ class ScreenModel:
         return question_view(picture.question, picture.live)
 
     def fault(self) -> FaultView | None:
-        """The latest fault; those of a recorded run are long past."""
+        """The latest fault; those of a recorded run are long past, and what was declined is none."""
         picture = self.run.picture
-        return None if picture.setback is None or picture.is_recorded else fault_view(picture.setback)
+        if picture.setback is None or picture.is_recorded or picture.why_not_written:
+            return None
+        return fault_view(picture.setback)
 
     # Actions.
 
@@ -414,12 +416,14 @@ class ScreenModel:
         """Where somebody has edited the config since, the three versions are shown."""
         try:
             async with self._devices.released():
-                self._compared = await change(run, PERSON)
+                done = await change(run, PERSON)
+                # Below a long change nobody would see it.
+                self._compared = (RELOAD, "", *done) if RELOAD in " ".join(done) else done
         except ConfigEditedSince as edited:
             self._compared = tuple(versions_text(edited.versions).splitlines())
             raise
         await self._read_history()
-        return RELOAD if RELOAD in " ".join(self._compared) else self._compared[-1]
+        return RELOAD if RELOAD in self._compared else self._compared[-1]
 
     async def _read_history(self) -> None:
         """Read which runs there are; where that fails, the history says why."""

@@ -209,6 +209,15 @@ async def test_the_end_of_a_run_is_a_single_fault_and_it_is_not_shown_as_running
         assert shown_banner.action.startswith("Press 2, then r resumes it")
 
 
+async def test_a_change_that_is_declined_is_no_fault_and_no_early_end(cell, run, history) -> None:
+    declined = events.Interrupted(reason="the new geometry was declined", exit_code=1)
+    async with attended(workplace_of(cell, run, [*history[:PROPOSED], declined])) as model:
+        run.tell(messages.StatusChanged(status=Status.ENDED), messages.HostFailed(problem="x", exit_code=1))
+        run.end()
+        await until(lambda: model.banner("measure").word == "NOT WRITTEN")
+        assert model.fault() is None
+
+
 @pytest.mark.parametrize(
     ("key", "keeps_running"), [("l", True), pytest.param("s", False, marks=pytest.mark.slow)]
 )

@@ -76,6 +76,9 @@ def _ended(picture: RunPicture) -> Banner:
             line = f"Position error {error} mm at the task poses, limit {accuracy.position.limit:g} mm"
         following = "4 Review shows the result, 5 History all runs."
         return Banner(word, line, following, "Nothing moves.", verdict_urgency(verdict))
+    if why := picture.why_not_written:
+        following = "Press 5: w there writes its proposal after all; 2 and r ask again."
+        return Banner("NOT WRITTEN", _capital(why), following, "", Urgency.ATTENTION)
     reason, is_lost = "its process is gone without a word; the robot may still move", False
     if isinstance(picture.setback, events.Interrupted):
         reason = picture.setback.reason

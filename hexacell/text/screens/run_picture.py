@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 
 from hexacell.campaign.decisions import Forecast
+from hexacell.errors import ExitCode
 from hexacell.run_process import messages
 from procedures.engine.command_loop import Status
 from procedures.run.keys import Phase, SetKey
@@ -62,6 +63,14 @@ class RunPicture:
     def may_command(self) -> bool:
         """Whether commands of this screen are taken."""
         return not self.is_recorded and (self.control is None or self.control.is_in_control)
+
+    @property
+    def why_not_written(self) -> str:
+        """Why a run ended without its result in the config: a person, or a gate; empty if it did not so."""
+        is_waiting = self.state.proposed is not None and self.state.committed is None
+        if is_waiting and isinstance(self.setback, events.Interrupted):
+            return self.setback.reason if self.setback.exit_code == ExitCode.OUT_OF_LIMITS else ""
+        return ""
 
     @property
     def at(self) -> SetKey | None:

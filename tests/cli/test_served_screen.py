@@ -20,6 +20,12 @@ from tests.waiting import until, wait_until
 in_a_browser = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
 
 
+@pytest.fixture(autouse=True)
+def sockets_have_short_paths(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Else each page says first that they have not, whatever it is to show."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+
+
 def pages_of(process: Process) -> list[str]:
     """The processes of its pages that are not over."""
     number = process.popen.pid
@@ -43,13 +49,13 @@ async def test_a_browser_shows_the_screen_and_its_keys_act(start, cell_folder, t
     process, address = served_at(start, cell_folder.cell)
     async with opened_browser(tmp_path / "browser") as browser:
         tab = await browser.open(address)
-        await tab.wait_for("Devices, as they show now")
+        await tab.wait_for("hexacell │")
         await tab.press("2")
         await tab.wait_for("What must hold before the robot moves")
         assert {url[: len(address)] for url in tab.loaded if not url.startswith("data:")} == {address}
         assert tab.problems == []
         other = await browser.open(address)
-        await other.wait_for("Devices, as they show now")
+        await other.wait_for("hexacell │")
         first, second = pages_of(process)
         await tab.close()
         await until(lambda: is_over(first))
@@ -57,13 +63,13 @@ async def test_a_browser_shows_the_screen_and_its_keys_act(start, cell_folder, t
         await other.press("q")
         await other.wait_for_element("body.-closed")
         await until(lambda: is_over(second))
-    assert process.stopped(signal.SIGINT).code == 0
+    process.popen.send_signal(signal.SIGINT)
+    assert await asyncio.to_thread(process.popen.wait) == 0
 
 
 @pytest.fixture
-def running_cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def running_cell(tmp_path: Path) -> Iterator[Path]:
     """A cell that another process serves; its run ends with it."""
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))  # where the path of a socket is short enough
     with served_in(tmp_path) as path:
         yield path
 
@@ -74,7 +80,7 @@ async def test_several_pages_watch_one_run(running_cell, start, tmp_path) -> Non
     _, address = served_at(start, running_cell)
     async with opened_browser(tmp_path / "browser") as browser:
         tab = await browser.open(address)
-        await tab.wait_for(" mm  ")
+        await tab.wait_for("um, 0.")
         await tab.press("2")
         await tab.wait_for("What must hold before the robot moves")
         await tab.press("s")
@@ -89,7 +95,7 @@ async def test_no_page_outlives_its_server(start, cell_folder, tmp_path, number:
     process, address = served_at(start, cell_folder.cell)
     async with opened_browser(tmp_path / "browser") as browser:
         tab = await browser.open(address)
-        await tab.wait_for("Devices, as they show now")
+        await tab.wait_for("hexacell │")
         [page] = pages_of(process)
         process.popen.send_signal(number)
         await tab.wait_for_element("body.-closed")

@@ -22,6 +22,7 @@ from hexacell.errors import DeviceError, UsageError
 from hexacell.python_process import python_command
 from hexacell.screen_server.access import Access
 from hexacell.services.preflight import is_loopback
+from hexacell.storage import atomic_files
 
 DEFAULT_PORT = 8000
 MOST_PAGES = 10
@@ -29,7 +30,7 @@ HEARTBEAT_S = 5.0
 """A browser that says nothing for half as long after so long a time is gone, and its process ends."""
 CLOSING_S = 2.0
 
-PAGE = Template(Path(__file__).with_name("page.html").read_text(encoding="utf-8"), autoescape=True)
+PAGE = Template(atomic_files.read_text(Path(__file__).with_name("page.html")), autoescape=True)
 HEADERS = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self' 'nonce-{nonce}'; style-src 'self' "
     "'unsafe-inline'; font-src 'self'; img-src data:; connect-src 'self' ws://{host}; base-uri 'none'; "

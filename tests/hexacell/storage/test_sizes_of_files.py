@@ -72,6 +72,7 @@ ELSEWHERE = {
     "drivers/thermometers.py": "reads a bounded number of bytes",
     "drivers/discovery/encoders.py": "a number of the kernel's",
     "drivers/controllers/linuxcnc/restart.py": "the kernel's list of a process; the end of a log",
+    "hexacell/screen_server/access.py": "tables of the kernel's",
     "hexacell/storage/output_files.py": "reads the first and the last bytes",
     "hexacell/services/unattended/scheduled_run.py": "the zone of the computer",
     "drivers/encoders/dbc.py": "looks at the size before a library reads",

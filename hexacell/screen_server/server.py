@@ -23,6 +23,7 @@ from hexacell.python_process import python_command
 from hexacell.screen_server.access import Access
 from hexacell.services.preflight import is_loopback
 from hexacell.storage import atomic_files
+from procedures.run.cancellation import cancel_and_wait, shielded
 
 DEFAULT_PORT = 8000
 MOST_PAGES = 10
@@ -68,8 +69,7 @@ class PageProcess(AppService):
         await self._download_manager.cancel_app_downloads(app_service_id=self.app_service_id)
         with suppress(ProcessLookupError):
             os.killpg(self._process.pid, signal.SIGKILL)
-        task.cancel()
-        await task
+        await cancel_and_wait(task)
         await self._process.wait()
 
 
@@ -129,10 +129,11 @@ class ScreenServer(Server):
             )
             width, height = (to_int(request.query.get(name, ""), 80) for name in ("width", "height"))
             try:
-                await process.start(width, height)
+                # A process that was just being started when the server ended would be nobody's.
+                await shielded(process.start(width, height))
                 await self._process_messages(websocket, process)
             finally:
-                await process.stop()
+                await shielded(process.stop())
         finally:
             del self._pages[websocket]
         return websocket

@@ -43,6 +43,12 @@ class PlotPanel(Vertical):
     def __init__(self, *, id: str | None = None, classes: str = "") -> None:  # noqa: A002 - as in every widget
         super().__init__(id=id, classes=f"panel {classes}")
         self._view: PlotView | None = None
+        self._across = (0.0, 1.0)
+
+    def on_resize(self) -> None:
+        """Have as many values along the axis as there is room for."""
+        plot: PlotWidget = self.query_one(".plot")  # type: ignore[assignment]  # see compose
+        plot.set_xticks(whole_numbers(*self._across, most=max(2, self.size.width // 9)))
 
     def compose(self) -> ComposeResult:
         """A note while there is nothing to draw, and the picture."""
@@ -80,7 +86,8 @@ class PlotPanel(Vertical):
         plot.set_ylimits(*ys)
         plot.margin_left, plot.margin_top, plot.margin_bottom = 7, 0, 1
         plot.set_y_formatter(_formatter(is_logarithmic=view.is_logarithmic))
-        plot.set_xticks(whole_numbers(*xs, most=max(2, self.size.width // 9)))
+        self._across = xs
+        self.on_resize()
         colours = self.app.theme_variables
         if level is not None:
             plot.plot(xs, (level, level), colours["error"], HiResMode.BRAILLE)

@@ -283,30 +283,26 @@ class KeyLine(Static):
 
     def show(self, has_effect: Callable[[str], bool]) -> None:
         """Show the keys of the screen and those of every screen, without those that have no effect now."""
-        every = self.screen.active_bindings.values()
         # Those of the screen come first.
-        bindings = [one.binding for one in sorted(every, key=lambda one: one.node is self.app)]
+        every = sorted(self.screen.active_bindings.items(), key=lambda one: one[1].node is self.app)
         shown = {
-            one.action: (one.key_display or self.app.get_key_display(one), one.description)
-            for one in reversed(bindings)
-            if one.show and has_effect(one.action)
+            one.binding.action: (key, self.app.get_key_display(one.binding), one.binding.description)
+            for key, one in reversed(every)
+            if one.binding.show and has_effect(one.binding.action)
         }
-        parts = tuple((action, *shown[action]) for action in reversed(shown))
+        parts = tuple(reversed(shown.values()))
         if parts != self._shown:
             self._shown = parts
             self.update(Content("  ").join(_key(*part) for part in parts))
 
 
-def _key(action: str, key: str, word: str) -> Content:
-    call = action if "." in action else f"screen.{action}" if action in _OF_SCREEN else f"app.{action}"
-    call = call if call.endswith(")") else f"{call}()"
+def _key(key: str, display: str, word: str) -> Content:
+    """A key with its word, which are not parted at the end of a line."""
     return Content.from_markup(
-        f"[@click={call}][b]$key[/b]\u00a0$word[/]", key=key, word=word.replace(" ", "\u00a0")
+        f"[@click=app.simulate_key('{key}')][b]$display[/b]\u00a0$word[/]",
+        display=display,
+        word=word.replace(" ", "\u00a0"),
     )
-
-
-_OF_SCREEN = ("write", "about('compare')", "about('roll back')", "exclude", "dismiss", "unfold", "file")
-"""Actions that a screen has itself."""
 
 
 def show_parts(screen: Screen[Any], model: ScreenModel, name: str) -> None:

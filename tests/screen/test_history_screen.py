@@ -17,6 +17,7 @@ from hexacell.screen.app import TechnicianApp
 from hexacell.screen.model import ScreenModel
 from hexacell.screen.overlays import ConfirmOverlay
 from hexacell.screen.preferences import ScreenAction
+from hexacell.screen.widgets import KeyLine
 from hexacell.screen.workplace import Workplace
 from hexacell.services.write_back.config_history import config_history
 from hexacell.text.config_changes import RELOAD
@@ -106,6 +107,13 @@ async def test_a_recorded_run_is_watched_again_with_its_cursor_and_undone(cell, 
         await until(lambda: [one.message for one in pilot.app._notifications] == [RELOAD])
     assert cell.config_path.read_bytes() == runs[1].before
     assert config_history(cell).writes[0].record.by == PERSON
+
+
+async def test_a_click_on_a_key_does_what_the_key_does(cell: Cell, runs: list[ProposedRun]) -> None:
+    async with opened_history(cell) as pilot:
+        assert str(pilot.app.screen.query_one(KeyLine).content).startswith("Enter\u00a0Show")
+        await pilot.click(KeyLine, offset=(2, 0))
+        await until_shown(pilot, "recorded calibration 2026-11-21T100000Z")
 
 
 @pytest.fixture

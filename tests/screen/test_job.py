@@ -105,7 +105,7 @@ async def test_from_mounting_to_approval(cell, run, history, opened) -> None:
         run.record(history[IDENTIFIED:PROPOSED])
         run.ask(ask_approval(PendingChange(proposed.gates, "-  old\n+  new"), cell=cell.settings.name))
         await until_shown(pilot, "+  new")
-        assert "✓ The residuals agree with the stated noise." in shown(pilot)
+        assert "ok  The residuals agree with the stated noise." in shown(pilot)
         await press(pilot, "y")
         assert run.given[1:] == [Answer("a person at the screen")]
 

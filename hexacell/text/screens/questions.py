@@ -31,7 +31,7 @@ def question_view(
             return _placement(place, live)
         case questions.PendingChange(gates=gates, displacement=moved, improvement=improvement) as pending:
             gain = improvement_sentence(improvement)
-            lines = "\n".join(f"{'✓' if gate.passed else '✗'} {gate.sentence}" for gate in gates)
+            lines = "\n".join(f"{'ok' if gate.passed else 'NO'}  {gate.sentence}" for gate in gates)
             facts = teaching_sentence(moved), gain, found_sentence(pending.found), lines
             title = "Write the new geometry into the controller's config?"
             view = _consenting(question, person, "write it", title)

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from hexacell.cell.fields import Frozen, GeometryDocument
+from hexacell.identification.data_faults.outlier_statistics import OutlierStatistics
 from hexacell.identification.identified_zeros import IdentifiedZeros, ParameterChoice
 from hexacell.identification.solver import result
 from hexacell.identification.solver.chi_square import ChiSquareTest
@@ -40,6 +41,31 @@ class OutlierRecord(Frozen):
         gauges = () if fault.kind is result.DataFaultKind.ZERO_SHIFT else tuple(fault.gauges)
         return cls(
             point=point, orientation=orientation, kind=fault.kind, gauges=gauges, off_mm=fault.offset_mm
+        )
+
+
+class RecordResidual(Frozen):
+    """What a record shows more than the identified geometry explains, along the gauges x, y and z.
+
+    ``sigmas`` is the largest of the three in standard deviations of what the noise leaves of it.
+    """
+
+    point: int
+    orientation: int
+    mm: Deviation
+    sigmas: float
+
+    @classmethod
+    def of_records(cls, found: result.Identification) -> tuple[Self, ...]:
+        """Of all records that were used."""
+        model = found.linear_model
+        along = -model.residuals @ model.problem.gauges
+        sigmas = np.sqrt(OutlierStatistics.of(model).along_gauges.max(axis=-1))
+        return tuple(
+            cls(point=point, orientation=orientation, mm=(x, y, z), sigmas=size)
+            for (point, orientation), (x, y, z), size in zip(
+                model.problem.labels.tolist(), along.tolist(), sigmas.tolist(), strict=True
+            )
         )
 
 

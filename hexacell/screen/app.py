@@ -216,6 +216,8 @@ class TechnicianApp(App[int]):
             return CALL.match(action) is None
         if asked := CALL.match(action):
             return self.model.allows(ScreenAction(asked[1]), asked[2] or "")
+        if action == "record_again":
+            return self.model.allows(ScreenAction.MEASURE_AGAIN)
         if action == "answer":
             return self.model.question() is not None or bool(self.model.proposing_run)
         return True

@@ -46,7 +46,7 @@ class DigitsScreen(Screen[None]):
     def draw(self, model: ScreenModel) -> None:
         """Show the gauges."""
         self.query_one(BannerBar).show(model.banner("measure"))
-        figures, records = model.figures()
+        figures, records = model.devices.figures()
         for number, (axis, figure, bar, urgency) in enumerate(figures[:GAUGES]):
             row = self.query_one(f"#gauge-{number}")
             row.border_title = f"gauge {axis}"

@@ -2,41 +2,38 @@
 
 import asyncio
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from operator import is_
 from typing import Any
 
 from hexacell.cell.loader import describe
-from hexacell.config.versions import ConfigEditedSince
-from hexacell.errors import HexacellError, UsageError
+from hexacell.errors import UsageError
 from hexacell.run_process.messages import LiveSnapshot
 from hexacell.run_process.recorded import RecordedRun
-from hexacell.screen.child import TriedPlan
-from hexacell.screen.preferences import ONCE, RESUME, WITH_LENGTH, ScreenAction
+from hexacell.screen.preferences import RESUME, WITH_LENGTH, ScreenAction
+from hexacell.screen.readiness import Readiness
+from hexacell.screen.run_history import RunHistory
+from hexacell.screen.shown_devices import ShownDevices
 from hexacell.screen.watching import DeviceWatcher, RunFollower
 from hexacell.screen.workplace import Workplace
 from hexacell.services.history.run_index import PastRun
 from hexacell.services.robot_view import first_scene
-from hexacell.text.config_changes import RELOAD, versions_text
-from hexacell.text.screens import banner, devices, past_runs, reviewing
+from hexacell.text.screens import banner, reviewing
 from hexacell.text.screens.cell_facts import cell_facts
-from hexacell.text.screens.checklist import (
-    checked_items,
-    live_items,
-    plan_lines,
-    plan_note,
-    plan_rows,
-    summary,
+from hexacell.text.screens.devices import device_cards
+from hexacell.text.screens.measuring import (
+    accuracy_plot,
+    fault_view,
+    progress,
+    record_rows,
+    records_by_name,
 )
-from hexacell.text.screens.measuring import accuracy_plot, fault_view, progress, record_rows
-from hexacell.text.screens.placing import WIDE_BAR, Placing, placing
-from hexacell.text.screens.questions import ABORTING, PERSON, question_view
+from hexacell.text.screens.questions import ABORTING, again_question, question_view
 from hexacell.text.screens.run_picture import header_line, refusal_text
-from hexacell.text.screens.views import Banner, ChecklistItem, FaultView, Line, Mark, QuestionView, Urgency
+from hexacell.text.screens.views import Banner, FaultView, QuestionView, Urgency
 from procedures.calibration.calibration import Mode
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Abort, Answer, MeasureAgain, Pause, Resume, Undo
-from procedures.run.keys import ThreeNumbers
 
 SPEEDS = (0.0, 1.0, 10.0, 60.0, 600.0)
 """Speeds of a recorded run, as multiples of that at which it was recorded; the first is standstill."""
@@ -50,24 +47,21 @@ class ScreenModel:
 
     Attributes:
         run: the run that is followed, live or recorded.
+        devices: what the devices show.
         changed: set whenever there may be something else to show.
-        runs: the runs of the cell, the latest first; None until they are read.
     """
 
     def __init__(self, workplace: Workplace, now: Callable[[], float] = time.monotonic) -> None:
-        self._workplace, self._now = workplace, now
+        self._workplace = workplace
         self.changed = asyncio.Event()
         self.run = RunFollower(now, self._after_run, self.changed.set)
         self._devices = DeviceWatcher(workplace.watch, now, self.changed.set)
+        self.devices = ShownDevices(self.run, self._devices, lambda: workplace.cell.settings, now)
         self._run_is_over = asyncio.Event()
-        self._is_checking, self._is_starting, self._is_ready = False, False, False
-        self._is_unfolded = False
+        self._is_starting = False
+        self._readiness = Readiness(workplace, self._devices)
+        self._history = RunHistory(workplace, self._devices)
         self._scene = first_scene(workplace.cell)
-        self._checked: tuple[ChecklistItem, ...] | None = None
-        self.runs: tuple[PastRun, ...] | None = None
-        self._compared: tuple[str, ...] = ()
-        self._tried: TriedPlan | None = None
-        self._trial: asyncio.Future[TriedPlan] | None = None
         self._reviewed: tuple[tuple[object, ...], dict[str, tuple[Any, ...]]] | None = None
 
     async def attend(self) -> None:
@@ -79,7 +73,7 @@ class ScreenModel:
             else:
                 await self.run.follow(running)
             while True:
-                await self._read_history()
+                await self._history.read()
                 await self._run_is_over.wait()
                 self._run_is_over.clear()
         finally:
@@ -92,6 +86,11 @@ class ScreenModel:
         self._run_is_over.set()
 
     # Views.
+
+    @property
+    def runs(self) -> tuple[PastRun, ...] | None:
+        """The runs of the cell, the latest first; None until they are read."""
+        return self._history.runs
 
     @property
     def fault_number(self) -> int:
@@ -139,8 +138,9 @@ class ScreenModel:
             case "cell":
                 return banner.cell_banner(self._devices.live, self._devices.problem)
             case "preflight":
+                checked, is_checking = self._readiness.checked, self._readiness.is_checking
                 return banner.preflight_banner(
-                    self._checked, is_checking=self._is_checking, is_running=self._is_running
+                    checked, is_checking=is_checking, is_running=self._is_running
                 )
             case _:
                 return banner.history_banner(None if self.runs is None else len(self.runs))
@@ -148,42 +148,28 @@ class ScreenModel:
     def shown(self, screen: str) -> dict[str, tuple[Any, ...]]:
         """What the parts of a screen show now, by their names: what each ``show`` is called with."""
         cell, picture = self._workplace.cell, self.run.picture
-        tried, is_trying = self._tried or TriedPlan(), self._trial is not None
         match screen:
             case "cell":
                 warnings = [(one, Urgency.ATTENTION) for one in self._workplace.warnings]
                 facts = ([*warnings, *((one, Urgency.CALM) for one in cell_facts(cell))],)
-                cards = (devices.device_cards(*self._live()),)
+                cards = (device_cards(*self._live()),)
                 return {"cards": cards, "facts": facts, "robot": (self._scene,)}
             case "preflight":
-                if (checked := self._checked) is None:
-                    checked = checked_items(Mark.BUSY if self._is_checking else Mark.OPEN)
-                items = (*live_items(self._live()[0], is_checking=self._is_checking), *checked)
-                lines = [(summary(items), Urgency.CALM)]
-                lines += [line for item in items for line in item.lines(is_unfolded=self._is_unfolded)]
-                return {
-                    "checklist": (lines,),
-                    "plan": (plan_lines(cell.settings, tried.lines, is_trying=is_trying),),
-                }
+                return self._readiness.checklist(self._live()[0])
             case "plan":
-                note = plan_note(tried.poses, is_trying=is_trying)
-                return {"plan-note": (note,), "poses": ([*plan_rows(cell.settings, tried.poses)],)}
+                return self._readiness.poses()
             case "measure":
                 limit = cell.settings.identification.target_mm or cell.settings.acceptance.position_mm
                 return {
                     "progress": (progress(picture, cell.settings),),
-                    "gauges": (self.gauges(),),
+                    "gauges": (self.devices.gauges(),),
                     "records": (record_rows(picture),),
                     "accuracy": (accuracy_plot(picture, limit),),
                 }
             case "review":
                 return self._result()
             case _:  # the history
-                return {
-                    "runs": (past_runs.run_rows(self.runs or ()),),
-                    "trend": (past_runs.trend_plot(self.runs or ()),),
-                    "comparison": (self._compared or past_runs.NOTHING_ASKED,),
-                }
+                return self._history.shown()
 
     @property
     def described(self) -> tuple[str, tuple[str, ...]]:
@@ -194,62 +180,14 @@ class ScreenModel:
 
     def _live(self) -> tuple[LiveSnapshot | None, float]:
         """What the devices showed last, and how long ago, s."""
-        picture, watched = self.run.picture, self._devices
-        if self._is_running:
-            return picture.live, self._now() - picture.live_at_s
-        return watched.live, self._now() - watched.live_at_s
-
-    def _measured(self) -> tuple[LiveSnapshot | None, float, ThreeNumbers | None]:
-        """What the devices of the run showed last, how long ago, s, and the zero of its set.
-
-        Where no run has begun, these are the devices of the cell.
-        """
-        picture = self.run.picture
-        if self.run.connection is None and self._devices.live is not None:
-            return (*self._live(), None)
-        zero = None if picture.at is None else picture.state.zero_shown(picture.at)
-        return picture.live, self._now() - picture.live_at_s, zero
-
-    def gauges(self) -> list[Line]:
-        """A line for each gauge, and one for the other devices."""
-        return devices.gauge_lines(*self._measured())
-
-    def placing(self) -> Placing:
-        """How the gauges stand while they are placed."""
-        return placing(self._measured()[0], self._workplace.cell.settings.stations.mounting_mm)
-
-    def figures(self) -> tuple[list[tuple[str, str, str, Urgency]], int]:
-        """Axis, figure, bar and urgency of each gauge, and the number of records."""
-        snapshot, _, zero = self._measured()
-        shown: list[tuple[str, str, str, Urgency]] = [
-            (
-                one.axis,
-                devices.gauge_figure(one, zero),
-                devices.travel_bar(devices.plunger_place(one), one.travel_mm / 2.0, WIDE_BAR),
-                devices.urgency_of(one.problem),
-            )
-            for one in (() if snapshot is None else snapshot.gauges)
-        ]
-        return shown, sum(len(measured.samples) for measured in self.run.picture.state.sets.values())
+        return self.devices.live(is_running=self._is_running)
 
     def _result(self) -> dict[str, tuple[Any, ...]]:
         """The parts of the result; made again where something has changed beside the live values."""
         picture, may_write = self.run.picture, bool(self.proposing_run)
         seen = (picture.state, picture.question, may_write)
         if self._reviewed is None or not all(map(is_, self._reviewed[0], seen)):
-            settings, state = self._workplace.cell.settings, picture.state
-            verdict, consequences, scope = reviewing.review_lines(picture, may_write=may_write)
-            shown: dict[str, tuple[Any, ...]] = {
-                "verdict": verdict,
-                "consequences": (consequences,),
-                "scope": (scope,),
-                "frames": (reviewing.frames_note(state),),
-                "parameters": (reviewing.parameter_cells(state, settings),),
-                "change": (reviewing.change_text(picture),),
-                "plot-deviation": (reviewing.deviation_plot(state),),
-                "plot-residual": (reviewing.residual_plot(picture),),
-                "plot-accuracy": (accuracy_plot(picture, settings.acceptance.position_mm),),
-            }
+            shown = reviewing.parts(picture, self._workplace.cell.settings, may_write=may_write)
             self._reviewed = (seen, shown)
         return self._reviewed[1]
 
@@ -289,7 +227,7 @@ class ScreenModel:
             case asked.START if not self._may_start(argument):
                 return False
             case asked.CHECK | asked.START | asked.EXCLUDE | asked.ROLL_BACK | asked.APPLY:
-                return not (self._is_running or self._is_checking or self._is_starting)
+                return not (self._is_running or self._readiness.is_checking or self._is_starting)
             case _:
                 return True
 
@@ -316,6 +254,9 @@ class ScreenModel:
                 await self.run.give(Pause(at_once=True))
             case ScreenAction.UNDO:
                 await self.run.give(Undo())
+            case ScreenAction.MEASURE_AGAIN if argument:
+                record = records_by_name(self.run.picture)[argument]
+                await self.run.give(MeasureAgain(record.at, record.orientation))
             case ScreenAction.MEASURE_AGAIN if at is not None:
                 await self.run.give(MeasureAgain(at))
             case ScreenAction.MEASURE_AGAIN:
@@ -325,26 +266,25 @@ class ScreenModel:
             case ScreenAction.TAKE_CONTROL if connection is not None:
                 await connection.take_control()
             case ScreenAction.CHECK:
-                await self._check(argument)
+                await self._readiness.check(argument)
             case ScreenAction.START:
                 await self._start(argument)
             case ScreenAction.PREVIEW:
-                await self._preview(argument)
+                await self._readiness.preview(argument)
             case ScreenAction.EXCLUDE:
-                await workplace.toggle_exclusion(argument, self._tried.poses if self._tried else ())
-                await self._preview("")
+                await self._readiness.toggle_exclusion(argument)
             case ScreenAction.COMPARE:
-                self._compared = await workplace.compare(argument)
+                await self._history.compare(argument)
             case ScreenAction.DRIFT:
-                self._compared = await workplace.drift()
+                await self._history.drift()
             case ScreenAction.ROLL_BACK:
-                return await self._change_config(workplace.roll_back, argument)
+                return await self._history.roll_back(argument)
             case ScreenAction.APPLY:
-                return await self._change_config(workplace.apply, argument)
+                return await self._history.apply(argument)
             case ScreenAction.OPEN:
                 await self.run.follow(await workplace.open_run(argument))
             case ScreenAction.UNFOLD:
-                self._is_unfolded = not self._is_unfolded
+                self._readiness.unfold()
             case ScreenAction.STEP | ScreenAction.PLAY if (recording := self._recording) is not None:
                 self._wind(recording, action, argument)
         return ""
@@ -356,6 +296,8 @@ class ScreenModel:
                 return question_view(await self._workplace.approval(argument), None)
             case ScreenAction.ABORT:
                 return ABORTING
+            case ScreenAction.MEASURE_AGAIN if argument:
+                return again_question(argument)
             case ScreenAction.ROLL_BACK:
                 is_there = await self._workplace.is_in_controller(argument)
                 return reviewing.rollback_question(argument, is_in_controller=is_there)
@@ -371,19 +313,10 @@ class ScreenModel:
         if self._is_running:
             await self.run.leave(keep_running=keep_running)
 
-    async def _check(self, what: str) -> None:
-        self._checked, self._is_ready, self._is_checking = None, False, True
-        try:
-            async with self._devices.released():
-                preflight = await self._workplace.check(what or Mode.OPTIMISE)
-            self._checked, self._is_ready = preflight.items, preflight.is_ready
-        finally:
-            self._is_checking = False
-
     async def _start(self, what: str) -> None:
         """Checked again, as anything may have changed since somebody looked."""
-        await self._check(what)
-        if not self._is_ready:
+        await self._readiness.check(what)
+        if not self._readiness.is_ready:
             raise UsageError("not everything holds that must hold", action="Look at 2 Preflight")
         await self._devices.stop()
         self._is_starting = True
@@ -394,43 +327,6 @@ class ScreenModel:
             raise
         finally:
             self._is_starting = False
-
-    async def _preview(self, how_often: str) -> None:
-        """Try the plan; an earlier trial is given up."""
-        if how_often == ONCE and (self._trial is not None or self._tried is not None):
-            return
-        if self._trial is not None:
-            self._trial.cancel()
-        trial = self._trial = asyncio.ensure_future(self._workplace.preview())
-        try:
-            await asyncio.wait([trial])
-            if trial is self._trial:
-                self._trial = None
-                self._tried = trial.result()
-        finally:
-            trial.cancel()
-
-    async def _change_config(
-        self, change: Callable[[str, str], Awaitable[tuple[str, ...]]], run: str
-    ) -> str:
-        """Where somebody has edited the config since, the three versions are shown."""
-        try:
-            async with self._devices.released():
-                done = await change(run, PERSON)
-                # Below a long change nobody would see it.
-                self._compared = (RELOAD, "", *done) if RELOAD in " ".join(done) else done
-        except ConfigEditedSince as edited:
-            self._compared = tuple(versions_text(edited.versions).splitlines())
-            raise
-        await self._read_history()
-        return RELOAD if RELOAD in self._compared else self._compared[-1]
-
-    async def _read_history(self) -> None:
-        """Read which runs there are; where that fails, the history says why."""
-        try:
-            self.runs = await self._workplace.runs()
-        except HexacellError as error:
-            self.runs, self._compared = (), tuple(str(error).splitlines())
 
     def _wind(self, recording: RecordedRun, action: ScreenAction, argument: str) -> None:
         """Step to an end or by a number of events; play or halt, ``+`` faster, ``-`` slower."""

@@ -163,9 +163,9 @@ class QuestionOverlay(AnswerOverlay[None]):
     def draw(self, model: ScreenModel) -> None:
         """Show the gauges as they are now."""
         if self.view.beside is views.Beside.PLACING:
-            self.query_one(PlacingPanel).show(model.placing())
+            self.query_one(PlacingPanel).show(model.devices.placing())
         elif self.view.beside is views.Beside.GAUGES:
-            self.query_one("#mounting", LinePanel).show(model.gauges())
+            self.query_one("#mounting", LinePanel).show(model.devices.gauges())
 
 
 class FaultOverlay(ModalScreen[None]):

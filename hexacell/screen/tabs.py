@@ -110,7 +110,7 @@ class MeasureScreen(TabScreen):
             yield titled(widgets.ProgressPanel(id="progress"), "Progress")
             yield titled(widgets.LinePanel(id="gauges"), "Gauges, deviation from the reference")
         with Horizontal(id="lower"):
-            yield titled(widgets.Table(RECORD_COLUMNS, id="records", is_read=True), "Records")
+            yield titled(widgets.RecordTable(RECORD_COLUMNS, id="records"), "Records")
             yield PlotPanel(id="accuracy")
 
 
@@ -134,7 +134,7 @@ class ReviewScreen(TabScreen):
                 yield PlotPanel(id="plot-accuracy")
             with titled(Vertical(), "Parameters"):
                 yield widgets.TextPanel(id="frames")
-                yield widgets.Table(PARAMETER_COLUMNS, id="parameters", is_read=True)
+                yield widgets.Table(PARAMETER_COLUMNS, id="parameters")
             yield titled(widgets.TextPanel(id="change"), "The change of the controller's config")
 
 
@@ -167,7 +167,7 @@ class HistoryScreen(TabScreen):
 
     async def action_about(self, what: str) -> None:
         """Do something about the run that is chosen."""
-        if (run := self.query_one(widgets.Table).chosen) is not None:
+        if (run := self.query_one(widgets.ChoiceTable).chosen) is not None:
             await self.run_action(f"app.perform({what!r}, {run!r})")
 
     async def action_write(self) -> None:

@@ -7,7 +7,7 @@ wrap at 80 columns, so the keys are a line of text.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from rich.text import Text
 from textual.app import ComposeResult
@@ -156,38 +156,36 @@ class ProgressPanel(Vertical):
         self._bar.display = progress.planned > 0
         if (self._bar.total, self._bar.progress) != (progress.planned, progress.done):
             self._bar.update(total=progress.planned or None, progress=min(progress.done, progress.planned))
+            self.call_after_refresh(self.on_resize)
+
+    def on_resize(self) -> None:
+        """Fill the bar by its width now: it rounds by the width that it has when it is set."""
+        bar: Any = self._bar.query_one("#bar")
+        bar.percentage = self._bar.percentage
 
 
 class Table(DataTable[Text]):
-    """Rows with a name each; what is chosen stays chosen, and new rows at the end come into view."""
+    """Rows with a name each, to be read: new rows at the end come into view."""
 
-    def __init__(self, columns: Iterable[Column], *, id: str, is_read: bool = False) -> None:  # noqa: A002 - as in every widget
-        super().__init__(
-            id=id, cursor_type="none" if is_read else "row", zebra_stripes=True, cell_padding=0
-        )
+    CURSOR: ClassVar[Literal["none", "row"]] = "none"
+
+    def __init__(self, columns: Iterable[Column], *, id: str) -> None:  # noqa: A002 - as in every widget
+        super().__init__(id=id, cursor_type=self.CURSOR, zebra_stripes=True, cell_padding=0)
         self._rows: list[Row] = []
         self._theme = ""
-        self._columns, self._is_read = tuple(columns), is_read
+        self._columns = tuple(columns)
 
     def on_mount(self) -> None:
         """Make the columns, whose width is fixed: figures are not cut unseen."""
         for one in self._columns:
             self.add_column(_cell(one, one.name, "bold"), width=one.width, key=one.name)
 
-    @property
-    def chosen(self) -> str | None:
-        """The name of the chosen row; None without rows."""
-        return (
-            self._rows[self.cursor_row].name if self._rows and self.cursor_row < len(self._rows) else None
-        )
-
     def show(self, rows: Sequence[Row]) -> None:
         """Show these rows; those that are there already stay as they are."""
         rows = list(rows)
         if (rows == self._rows and self._theme == self.app.theme) or not self.columns:
             return
-        name, is_at_end = self.chosen, self.scroll_y >= self.max_scroll_y - 1
-        known = len(self._rows)
+        is_at_end, known = self.scroll_y >= self.max_scroll_y - 1, len(self._rows)
         if rows[:known] != self._rows or self._theme != self.app.theme:
             self.clear()
             known = 0
@@ -196,16 +194,47 @@ class Table(DataTable[Text]):
             cells = zip(self._columns, row.cells, strict=True)
             self.add_row(*(_cell(column, text, style) for column, text in cells), key=row.name)
         self._rows, self._theme = rows, self.app.theme
-        if self._is_read and is_at_end:
+        if is_at_end:
             self.call_after_refresh(self.scroll_end, animate=False)
-        elif name is not None and (found := [n for n, one in enumerate(rows) if one.name == name]):
-            self.move_cursor(row=found[0])
 
 
 class ChoiceTable(Table):
-    """A table of which a row is chosen, and something is done with it by Enter."""
+    """A table of which a row is chosen, which stays chosen, and something is done with it by Enter."""
 
+    CURSOR = "row"
     BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "select_cursor", "Show", key_display="Enter")]
+
+    @property
+    def chosen(self) -> str | None:
+        """The name of the chosen row; None without rows."""
+        return self._rows[self.cursor_row].name if 0 <= self.cursor_row < len(self._rows) else None
+
+    def show(self, rows: Sequence[Row]) -> None:
+        """Show these rows."""
+        name, names = self.chosen, [one.name for one in rows]
+        super().show(rows)
+        if name in names:
+            self.move_cursor(row=names.index(name))
+
+
+class RecordTable(ChoiceTable):
+    """A table of records: the last one is chosen unless another is."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("enter", "record_again", "Record again", key_display="Enter")
+    ]
+
+    def show(self, rows: Sequence[Row]) -> None:
+        """Show these rows."""
+        is_last = self.cursor_row >= len(self._rows) - 1
+        super().show(rows)
+        if is_last:
+            self.move_cursor(row=len(rows) - 1)
+
+    async def action_record_again(self) -> None:
+        """Ask for the chosen record once more."""
+        if (record := self.chosen) is not None:
+            await self.run_action(f"app.perform('measure again', {record!r})")
 
 
 def _cell(column: Column, text: str, style: str) -> Text:
@@ -276,6 +305,9 @@ class TabLine(Static):
         super().__init__(Content("  ").join(parts))
 
 
+BETWEEN_KEYS = "  "
+
+
 class KeyLine(Static):
     """The keys that act here and now, a word each; a click does the same."""
 
@@ -293,16 +325,23 @@ class KeyLine(Static):
         parts = tuple(reversed(shown.values()))
         if parts != self._shown:
             self._shown = parts
-            self.update(Content("  ").join(_key(*part) for part in parts))
+            self.on_resize()
+
+    def on_resize(self) -> None:
+        """Fill lines: a key and its word are not parted, as Textual does even at spaces that forbid it."""
+        lines: list[list[Content]] = [[]]
+        for key in (_key(*part) for part in self._shown):
+            taken = sum(one.cell_length + len(BETWEEN_KEYS) for one in lines[-1])
+            if lines[-1] and taken + key.cell_length > self.content_size.width:
+                lines.append([])
+            lines[-1].append(key)
+        self.update(Content("\n").join(Content(BETWEEN_KEYS).join(line) for line in lines))
 
 
 def _key(key: str, display: str, word: str) -> Content:
-    """A key with its word, which are not parted at the end of a line."""
-    return Content.from_markup(
-        f"[@click=app.simulate_key('{key}')][b]$display[/b]\u00a0$word[/]",
-        display=display,
-        word=word.replace(" ", "\u00a0"),
-    )
+    """A key with its word."""
+    markup = f"[@click=app.simulate_key('{key}')][b]$display[/b] $word[/]"
+    return Content.from_markup(markup, display=display, word=word)
 
 
 def show_parts(screen: Screen[Any], model: ScreenModel, name: str) -> None:

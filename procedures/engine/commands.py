@@ -32,7 +32,7 @@ class Resume:
 
 @dataclass(frozen=True, slots=True)
 class Undo:
-    """Take the last record of the set that is being measured again; its reference voids the set."""
+    """Take the last record again, of the set being measured or else of all; a reference voids its set."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,9 +120,12 @@ class CommandQueue:
 def invalidation_event(command: Undo | MeasureAgain, state: RunState) -> Invalidation:
     """The event of a command; raises ``UsageError`` where no such record is, or a result depends on it."""
     if isinstance(command, Undo):
-        measured = [key for key in state.open_sets if state.set(key).samples]
+        begun = [
+            key for key, one in state.sets.items() if one.samples
+        ]  # the last, where the robot has left it
+        measured = [key for key in state.open_sets if key in begun] or begun
         if not measured:
-            raise UsageError("there is no record to undo in the set that is being measured")
+            raise UsageError("there is no record to undo yet")
         key = state.at_pose[0] if state.at_pose and state.at_pose[0] in measured else measured[-1]
         orientation: int | None = state.sets[key].samples[-1].orientation
     else:

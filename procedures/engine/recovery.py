@@ -154,6 +154,7 @@ class Recovery:
         """The failure with the action to take, chosen by a person if need be; None to end the run."""
         if failure.action is not Action.ASK:
             return failure
+        self.record(failure)  # when it was, not only when it is answered
         question = ask_recovery(failure.reason, choices(failure))
         try:
             action = Action(str(await self.commands.run_cancellable(self.broker.ask(question))))

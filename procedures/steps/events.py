@@ -205,7 +205,8 @@ class Failed(BaseEvent):
     """A step, or deciding on one, failed; motion was stopped.
 
     ``failure`` is its kind, ``attempt`` counts failures of this kind at this set or step since the
-    run was begun or resumed, and ``action`` is the reaction; ``asked`` is whether a person chose it.
+    run was begun or resumed, and ``action`` is the reaction. Where a person is asked there are two events:
+    one when it fails, whose action is to ask, and one that is ``asked``, with the action chosen.
     """
 
     kind: Literal["failed"] = "failed"
@@ -219,8 +220,12 @@ class Failed(BaseEvent):
     def applied_to(self, state: RunState) -> RunState:
         """A ball that left its plate on the way to a chosen pose is a rejected record.
 
+        Nothing is decided while a person is asked.
+
         Where the whole set is measured again, nothing is measured near that pose: the estimate errs there.
         """
+        if self.action is Action.ASK:
+            return state
         where = (self.failure, place_of(self.step))
         counted = replace(state, failures={**state.failures, where: self.attempt}).without_position()
         is_redone, is_off_plate = self.action is Action.REDO_SET, self.failure is FailureKind.GAUGE_AT_END
@@ -233,7 +238,8 @@ class Failed(BaseEvent):
         return counted.unverified() if self.action is Action.MEASURE_AGAIN else counted
 
     def text(self, state: RunState) -> str:
-        return f"{self.reason}\n  attempt {self.attempt}: {self.action.value}"
+        reaction = "a person is asked" if self.action is Action.ASK else self.action.value
+        return reaction if self.asked else f"{self.reason}\n  attempt {self.attempt}: {reaction}"
 
 
 class CommandRejected(BaseEvent):

@@ -8,7 +8,7 @@ from hexacell.identification.estimator import identify
 from hexacell.measurements.csv_file import write_measurements
 from hexacell.noise.reversal import Reversal
 from hexacell.noise.worsening import Worsening
-from hexacell.results.result import ExpectedImprovement, IdentificationResult
+from hexacell.results.result import ExpectedImprovement, IdentificationResult, RecordResidual
 from hexacell.verdict.assessment import Assessment, assess
 from hexacell.verdict.findings import findings
 from hexacell.verdict.fit_document import fit_document
@@ -28,7 +28,7 @@ class Identified(BaseEvent):
     cannot take them safely before it is calibrated. ``improvement`` is None where the robot can reach none
     of the task poses. ``quick`` is how well the quick level knows the robot; None in other runs.
     ``reversal`` is what repeated visits of the references showed; None of too few. ``worsening`` is how
-    much worse the machine came back later; None unless significant.
+    much worse the machine came back later; None unless significant. Older journals have no ``residuals``.
     """
 
     kind: Literal["identified"] = "identified"
@@ -39,6 +39,7 @@ class Identified(BaseEvent):
     quick: QuickAccuracy | None = None
     reversal: Reversal | None = None
     worsening: Worsening | None = None
+    residuals: tuple[RecordResidual, ...] = ()
 
     kept_as: ClassVar[str] = "identified"
 
@@ -70,6 +71,7 @@ class Identify(Computation):
             quick=known.quick.accuracy(measurements) if is_quick else None,
             reversal=reversal_by_repeats(known.plan, state, identified),
             worsening=worsening_by_repeats(known.plan, state, identified, robot.noise.walk),
+            residuals=RecordResidual.of_records(identified),
         )
 
 

@@ -111,7 +111,7 @@ async def test_a_recorded_run_is_watched_again_with_its_cursor_and_undone(cell, 
 
 async def test_a_click_on_a_key_does_what_the_key_does(cell: Cell, runs: list[ProposedRun]) -> None:
     async with opened_history(cell) as pilot:
-        assert str(pilot.app.screen.query_one(KeyLine).content).startswith("Enter\u00a0Show")
+        assert str(pilot.app.screen.query_one(KeyLine).content).startswith("Enter Show")
         await pilot.click(KeyLine, offset=(2, 0))
         await until_shown(pilot, "recorded calibration 2026-11-21T100000Z")
 

@@ -16,6 +16,7 @@ from hexacell.run_process.client import LOST
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.child import Preflight
 from hexacell.screen.overlays import ConfirmOverlay, FaultOverlay, QuestionOverlay
+from hexacell.screen.widgets import RecordTable
 from hexacell.text.screens.measuring import RESUMABLE
 from hexacell.text.screens.views import ChecklistItem, Mark
 from procedures.engine.command_loop import Status
@@ -117,6 +118,19 @@ async def test_from_mounting_to_approval(cell, run, history, opened) -> None:
         await until_shown(pilot, "PASS: The error and the guard band together are within the limit.")
         assert "Teach anew" in shown(pilot)
         assert re.search(r"S1y -\d+\.\d{3} -\d+\.\d{3} -5\.751 0\.095 +changed \(60", shown(pilot))
+
+
+async def test_any_record_in_the_table_is_measured_again_once_it_is_confirmed(cell, run, history, opened):
+    async with opened(workplace_of(cell, run, history[:300])) as pilot:
+        await until_shown(pilot, "point 5")
+        await press(pilot, "up", "up", "enter", "n")
+        assert run.given == []
+        table = pilot.app.screen.query_one(RecordTable)
+        assert table.chosen is not None
+        point, orientation = map(int, table.chosen.split("/"))
+        assert table.cursor_row == table.row_count - 3, "the last one was chosen before"
+        await press(pilot, "enter", "y")
+        assert run.given == [MeasureAgain(SetKey(phase=Phase.IDENTIFY, point=point), orientation)]
 
 
 async def test_one_key_each_for_who_is_in_control(cell, run, history, opened) -> None:

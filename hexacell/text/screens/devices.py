@@ -8,6 +8,9 @@ from procedures.run.keys import ThreeNumbers
 BAR_COLUMNS = 21
 """Columns of the picture of a plunger in its travel; odd, so that the middle has a place."""
 
+WIDE_BAR = 33
+"""Of one that is read from afar."""
+
 OLD_S = 2.0
 """Silence of a device from which it is shown, s."""
 
@@ -168,3 +171,18 @@ def age_text(age_s: float | None, later_s: float) -> str:
         return "never"
     age = age_s + later_s
     return f"{age:.1f} s" if age < 99.95 else "> 99 s"
+
+
+def large_figures(
+    live: LiveSnapshot | None, zero: ThreeNumbers | None
+) -> list[tuple[str, str, str, Urgency]]:
+    """Axis, figure, bar and urgency of each gauge, to be read from afar."""
+    return [
+        (
+            one.axis,
+            gauge_figure(one, zero),
+            travel_bar(plunger_place(one), one.travel_mm / 2.0, WIDE_BAR),
+            urgency_of(one.problem),
+        )
+        for one in (() if live is None else live.gauges)
+    ]

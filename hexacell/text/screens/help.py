@@ -21,8 +21,9 @@ move. i shows which devices answered.""",
     "measure": """\
 What happens now, what is next, how long it takes with the people who place the gauges, and how to stop. \
 Each gauge shows its deviation from the reference, and where its plunger stands in its travel. A record \
-lands with what it is off: measured less predicted, the largest of x, y and z, and how many sigma that \
-is. More than 4 sigma is marked and deserves a look.
+lands with what it is off: measured less predicted, or less what the fit says once there is one, the \
+largest of x, y and z, and how many sigma that is. More than 4 sigma is marked and deserves a look; Enter \
+measures the chosen record again.
 
 The picture is the predicted error at the worst task pose; it falls record by record to the limit.""",
     "review": """\

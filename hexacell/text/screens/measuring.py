@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from hexacell.cell.model import CellSettings
+from hexacell.cell.recovery import Action
 from hexacell.lengths import from_to
 from hexacell.run_process.messages import HostFailed
 from hexacell.text.screens.questions import RECOVERIES
@@ -11,7 +12,6 @@ from hexacell.text.screens.time_left import readings
 from hexacell.text.screens.views import Column, FaultView, PlotView, Row, Series, Urgency
 from procedures.run.keys import Phase
 from procedures.steps import events
-from procedures.steps.move import Expectation
 
 RESUMABLE = "What was measured is kept. Mend it, then press r in 2 Preflight, which resumes the run."
 
@@ -26,12 +26,16 @@ PHASES = {
     Phase.LENGTH: "length check",
 }
 
+LETTERS = {Phase.IDENTIFY: "", Phase.BEFORE: "b", Phase.AFTER: "a", Phase.CONFIRM: "c", Phase.LENGTH: "L"}
+"""Before the names of records."""
+
 RECORD_COLUMNS = (
     Column("pose", 8),
     *(Column(name, 8, is_figure=True) for name in ("x mm", "y mm", "z mm", "off mm")),
     Column("sigma", 8, is_figure=True),
 )
-"""``off`` is the largest of x, y and z less what was predicted, ``sigma`` its ratio to the noise."""
+"""``off`` is the largest of x, y and z less what the fit says, before it less what was predicted; ``sigma``
+its ratio to the noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,37 +67,44 @@ def progress(picture: RunPicture, settings: CellSettings | None) -> Progress:
     return Progress(place, done, planned)
 
 
+def records_by_name(picture: RunPicture) -> dict[str, events.RecordTaken]:
+    """The records by the names that people read, in the order in which they were taken."""
+    every = (sample for measured in picture.state.sets.values() for sample in measured.samples)
+    return {f"{LETTERS[one.at.phase]}{one.at.point}/{one.orientation}": one for one in every}
+
+
 def record_rows(picture: RunPicture) -> tuple[Row, ...]:
-    """A row for each record, in the order in which they were taken."""
+    """A row for each record."""
     rows = []
-    for at, measured in picture.state.sets.items():
-        phase = {
-            Phase.IDENTIFY: "",
-            Phase.BEFORE: "b",
-            Phase.AFTER: "a",
-            Phase.CONFIRM: "c",
-            Phase.LENGTH: "L",
-        }
-        for sample in measured.samples:
-            name = f"{phase[at.phase]}{at.point}/{sample.orientation}"
-            values = tuple(f"{value:+.3f}" for value in sample.deviation_mm)
-            off = _off(sample, picture.expected.get((at, sample.orientation)))
-            if sample.orientation == 1:
-                shown = ("ref.", "")
-            elif off is None:
-                shown = ("", "")
-            else:
-                shown = (f"{off[0]:+.3f}", f"{off[1]:.1f}")
-            is_far = off is not None and off[1] > SUSPICIOUS_SIGMAS
-            far = f"{shown[1]} !" if is_far else shown[1]
-            urgency = Urgency.ATTENTION if is_far else Urgency.CALM
-            rows.append(Row(f"{at}/{sample.orientation}", (name, *values, shown[0], far), urgency))
+    for name, sample in records_by_name(picture).items():
+        values = tuple(f"{value:+.3f}" for value in sample.deviation_mm)
+        off = off_of(picture, sample)
+        if sample.orientation == 1:
+            shown = ("ref.", "")
+        elif off is None:
+            shown = ("", "")
+        else:
+            shown = (f"{off[0]:+.3f}", f"{off[1]:.1f}")
+        is_far = off is not None and off[1] > SUSPICIOUS_SIGMAS
+        far = f"{shown[1]} !" if is_far else shown[1]
+        urgency = Urgency.ATTENTION if is_far else Urgency.CALM
+        rows.append(Row(name, (name, *values, shown[0], far), urgency))
     return tuple(rows)
 
 
-def _off(sample: events.RecordTaken, expected: Expectation | None) -> tuple[float, float] | None:
-    """The largest difference from what was predicted, mm, and how many sigma that is; if there is one."""
-    if sample.orientation == 1 or expected is None:
+def off_of(picture: RunPicture, sample: events.RecordTaken) -> tuple[float, float] | None:
+    """By how much a record is off, mm, at its largest axis, and how many sigma that is; if it is known.
+
+    Off the fit, once there is one; before, and of records that are not in it, off what was predicted.
+    """
+    if sample.orientation == 1:
+        return None
+    identified, place = picture.state.identified, (sample.at.point, sample.orientation)
+    if identified is not None and sample.at.phase is Phase.IDENTIFY:
+        of_fit = {(one.point, one.orientation): one for one in identified.residuals}
+        if (residual := of_fit.get(place)) is not None:
+            return max(residual.mm, key=abs), residual.sigmas
+    if (expected := picture.expected.get((sample.at, sample.orientation))) is None:
         return None
     pairs = zip(sample.deviation_mm, expected.deviation_mm, expected.sigma_mm, strict=True)
     found = [(measured - predicted, sigma) for measured, predicted, sigma in pairs]
@@ -131,12 +142,9 @@ def fault_view(setback: Setback) -> FaultView:
             where = f"{device}: " if device else ""
             return FaultView(f"Stopped by a guard: {guard.value}", f"{where}{problem}", action)
         case events.Failed(reason=reason, attempt=attempt, action=action):
-            does = RECOVERIES.get(action.value, action.value)
-            return FaultView(
-                "A step failed, the robot was stopped",
-                reason,
-                f"Nothing: {does} is under way (attempt {attempt}).",
-            )
+            does = f"Nothing: {RECOVERIES.get(action.value, '')} is under way (attempt {attempt})."
+            what_to_do = "Choose how to continue." if action is Action.ASK else does
+            return FaultView("A step failed, the robot was stopped", reason, what_to_do)
         case events.Interrupted(reason=reason):
             return FaultView("The run ended early", reason, RESUMABLE)
         case HostFailed(problem=problem, action=action, exit_code=exit_code):

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hexacell.run_process.messages import GaugeSnapshot, LiveSnapshot
-from hexacell.text.screens.devices import plunger_place, travel_bar
+from hexacell.text.screens.devices import WIDE_BAR, plunger_place, travel_bar
 from hexacell.text.screens.views import Line, Urgency
 
 BALL = ((-1, -3, "▄████▄"), (0, -3, "██████"), (1, -3, "▀████▀"))
@@ -13,7 +13,6 @@ BALL = ((-1, -3, "▄████▄"), (0, -3, "██████"), (1, -3, "
 MIDDLE = (5, 20)
 AXES = ((7, 1, "z"), (8, 1, "│ y"), (9, 1, "│/"), (10, 1, "└── x"))
 COLUMNS, ROWS = 35, 11
-WIDE_BAR = 33
 
 
 @dataclass(frozen=True, slots=True)

@@ -116,6 +116,25 @@ ABORTING = QuestionView(
 )
 
 
+AGAIN_FOLLOWS = (
+    "The robot goes back to the reference of its point. Where that shows something else by now, because "
+    "the gauges have been moved, the whole point is measured again."
+)
+
+
+def again_question(record: str) -> QuestionView:
+    """What a person confirms before a record that was taken is taken once more."""
+    return QuestionView(
+        title=f"Measure record {record} again?",
+        paragraphs=(AGAIN_FOLLOWS,),
+        instruction="Press y or n.",
+        choices=(
+            Choice("y", "yes, measure it again", questions.YES, is_consent=True),
+            Choice("n", "no, keep it", None),
+        ),
+    )
+
+
 def approval_refusal(gates: tuple[AcceptanceGate, ...]) -> str:
     """Why nobody can approve; empty where a person may."""
     failed = [gate.sentence for gate in gates if not gate.passed and not gate.needs_person]

@@ -1,5 +1,7 @@
 """The review of a run: its verdict, what follows from it, its parameters, and how it came about."""
 
+from typing import Any
+
 import numpy as np
 
 from hexacell.cell.model import CellSettings
@@ -7,6 +9,7 @@ from hexacell.text.config_changes import pending_text
 from hexacell.text.line_face import whole_event_text
 from hexacell.text.parameters import rows_of_run
 from hexacell.text.screens.banner import verdict_urgency
+from hexacell.text.screens.measuring import SUSPICIOUS_SIGMAS, accuracy_plot, off_of
 from hexacell.text.screens.questions import PERSON, approval_refusal
 from hexacell.text.screens.run_picture import RunPicture
 from hexacell.text.screens.views import Choice, Column, Line, PlotView, QuestionView, Row, Series, Urgency
@@ -149,22 +152,34 @@ def deviation_plot(state: RunState) -> PlotView:
 
 
 def residual_plot(picture: RunPicture) -> PlotView:
-    """Each record less what was predicted before it, in standard deviations of that; the largest axis."""
-    found = []
-    for number, sample in enumerate(picture.state.samples(Phase.IDENTIFY), start=1):
-        expected = picture.expected.get((sample.at, sample.orientation))
-        if expected is None or sample.orientation == 1:
-            continue
-        pairs = zip(sample.deviation_mm, expected.deviation_mm, expected.sigma_mm, strict=True)
-        scaled = [(measured - predicted) / sigma for measured, predicted, sigma in pairs if sigma > 0.0]
-        found.append((float(number), max(scaled, key=abs, default=0.0)))
+    """By how many standard deviations each record is off the fit, or before it off what was predicted."""
+    samples = enumerate(picture.state.samples(Phase.IDENTIFY), start=1)
+    found = [(float(number), off_of(picture, sample)) for number, sample in samples]
+    known = tuple((number, off[1]) for number, off in found if off is not None)
     return PlotView(
         title="Residual, sigma",
         x_label="record",
-        series=(Series("largest of x, y, z", "o", tuple(found)),),
-        level=0.0,
+        series=(Series("largest axis", "o", known),),
+        level=SUSPICIOUS_SIGMAS,
+        level_name=f"{SUSPICIOUS_SIGMAS:g} sigma",
         note="No record beside a reference is taken yet.",
     )
+
+
+def parts(picture: RunPicture, settings: CellSettings, *, may_write: bool) -> dict[str, tuple[Any, ...]]:
+    """All parts of a result, by their names; ``may_write``: whether the run may still be written."""
+    verdict, consequences, scope = review_lines(picture, may_write=may_write)
+    return {
+        "verdict": verdict,
+        "consequences": (consequences,),
+        "scope": (scope,),
+        "frames": (frames_note(picture.state),),
+        "parameters": (parameter_cells(picture.state, settings),),
+        "change": (change_text(picture),),
+        "plot-deviation": (deviation_plot(picture.state),),
+        "plot-residual": (residual_plot(picture),),
+        "plot-accuracy": (accuracy_plot(picture, settings.acceptance.position_mm),),
+    }
 
 
 def rollback_question(run: str, *, is_in_controller: bool) -> QuestionView:

@@ -7,7 +7,7 @@ import pytest
 
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
-from hexacell.results.result import IdentificationResult
+from hexacell.results.result import IdentificationResult, RecordResidual
 
 # docs/interface.md, the document of fit --json; termination is an addition.
 KEYS = (
@@ -39,6 +39,21 @@ def test_the_document_has_the_keys_of_the_interface(document):
     for part in (document["geometry"], document["sigma"]):
         shapes = {name: np.shape(values) for name, values in part.items()}
         assert shapes == {"S": (6, 3), "B": (6, 3), "l": (6,)}
+
+
+def test_residuals_are_what_the_found_geometry_leaves_of_each_record(identified, noisy):
+    residuals = RecordResidual.of_records(identified)
+    assert [(one.point, one.orientation) for one in residuals] == [one.id for one in noisy.records]
+    positions = identified.poses.positions
+    for point in range(1, 6):
+        rows = [row for row, one in enumerate(noisy.records) if one.point == point]
+        left = [np.subtract(noisy.records[row].deviation, positions[row]) for row in rows]
+        # What they have in common is the unknown place of the gauges.
+        between = np.array([residuals[row].mm for row in rows])
+        np.testing.assert_allclose(between - between[0], np.subtract(left, left[0]), atol=1e-9)
+    sigmas = np.array([one.sigmas for one in residuals])
+    assert 1.0 < np.median(sigmas) < 1.6, "the largest of three; of normal ones 1.26"
+    assert sigmas.max() < 4.5
 
 
 def test_the_covariance_is_in_the_order_of_the_geometry(document):

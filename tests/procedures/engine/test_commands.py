@@ -19,7 +19,7 @@ from procedures.steps.events import Step
 from procedures.steps.move import Move
 from procedures.steps.sample import Sample
 from tests.procedures.fakes import SilentOperator
-from tests.procedures.runs.listening import on
+from tests.procedures.runs.listening import happened, on, run_until
 from tests.procedures.story import READING
 from tests.waiting import until
 
@@ -76,14 +76,14 @@ class Stage:
         self.running: asyncio.Task[events.Ended] | None = None
 
     def _hear(self, event: events.Event, _: RunState) -> None:
-        for kind, happened in self._waiting:
+        for kind, has_come in self._waiting:
             if isinstance(event, kind):
-                happened.set()
+                has_come.set()
 
     async def until(self, kind: type[Any]) -> None:
-        happened = asyncio.Event()
-        self._waiting.append((kind, happened))
-        await happened.wait()
+        has_come = asyncio.Event()
+        self._waiting.append((kind, has_come))
+        await has_come.wait()
 
     async def held_at(self, key: str | None) -> None:
         self.script.hold = key
@@ -184,6 +184,17 @@ async def test_measure_again_discards_the_record_or_the_set(stage, command, even
     assert sorted(orientations) == [1, 2, 3]
 
 
+async def test_the_last_record_is_taken_again_though_the_robot_has_left_its_point(recording, replayed):
+    rig = replayed(recording.until(events.SetClosed, count=1), identification__orientations=4)
+    last = max(one.orientation for one in happened(rig, events.RecordTaken) if one.at == P1)
+    left = on(events.StepBegun, lambda: rig.engine.queue.put(Undo()))
+    await run_until(rig, events.SetClosed, left, count=1)
+    assert events.RecordDiscarded(at=P1, orientation=last) in happened(rig, events.RecordDiscarded)
+    state = fold(read_journal(rig.folder.journal))
+    assert state.set(P1).closed, "it is measured to its end again"
+    assert sorted(one.orientation for one in state.set(P1).samples) == list(range(1, last + 1))
+
+
 async def test_records_may_be_undone_during_a_pause(stage: Stage) -> None:
     await stage.paused_at("P1/o02/sample", at_once=False)
     stage.engine.queue.put(Undo())
@@ -198,7 +209,7 @@ async def test_records_may_be_undone_during_a_pause(stage: Stage) -> None:
     [
         (Resume(), "the run is not paused"),
         (Answer("yes"), "no question is open that this would answer"),
-        (Undo(), "there is no record to undo in the set that is being measured"),
+        (Undo(), "there is no record to undo yet"),
         (MeasureAgain(P1, 7), "P1 has no such record"),
     ],
 )

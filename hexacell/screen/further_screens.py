@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 GAUGES = 3
 
 WHAT_TO_PRESS = (
-    "x excludes the chosen pose or point in the cell file; on a line with OUT it removes that. "
+    "x excludes the chosen pose or point in the cell file; on a line with OUT it removes the exclusion. "
     "v tries the plan again, Escape goes back."
 )
 
@@ -132,7 +132,7 @@ class AssistantScreen(Screen[bool]):
             yield Input(id="first-answer", compact=True)
             yield TextPanel(id="first-problem")
             yield TextPanel(
-                "Enter takes the answer, Escape goes back to the one before, ctrl+q quits without a file.",
+                "Enter takes the answer, Escape goes back by one question, ctrl+q quits without a file.",
                 classes="hint",
             )
 

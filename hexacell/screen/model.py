@@ -34,6 +34,7 @@ from hexacell.text.screens.views import Banner, FaultView, QuestionView, Urgency
 from procedures.calibration.calibration import Mode
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Abort, Answer, MeasureAgain, Pause, Resume, Undo
+from procedures.steps import events
 
 SPEEDS = (0.0, 1.0, 10.0, 60.0, 600.0)
 """Speeds of a recorded run, as multiples of that at which it was recorded; the first is standstill."""
@@ -125,7 +126,9 @@ class ScreenModel:
 
     def header(self) -> tuple[str, str]:
         """The first line of every screen: what is done where, and who is in control."""
-        return header_line(self._workplace.cell.settings.name, self.run.picture)
+        settings = self._workplace.cell.settings
+        simulated = " │ SIMULATED" if settings.simulation is not None else ""
+        return header_line(f"{settings.name}{simulated}", self.run.picture)
 
     def banner(self, screen: str) -> Banner:
         """The banner of a screen: that of the run while one goes on, else what this screen is for."""
@@ -138,9 +141,12 @@ class ScreenModel:
             case "cell":
                 return banner.cell_banner(self._devices.live, self._devices.problem)
             case "preflight":
-                checked, is_checking = self._readiness.checked, self._readiness.is_checking
+                known = self._readiness
                 return banner.preflight_banner(
-                    checked, is_checking=is_checking, is_running=self._is_running
+                    known.items(self._live()[0]),
+                    is_checked=known.checked is not None,
+                    is_checking=known.is_checking,
+                    is_running=self._is_running,
                 )
             case _:
                 return banner.history_banner(None if self.runs is None else len(self.runs))
@@ -199,9 +205,10 @@ class ScreenModel:
         return question_view(picture.question, picture.live)
 
     def fault(self) -> FaultView | None:
-        """The latest fault; those of a recorded run are long past, and what was declined is none."""
+        """The latest fault that nobody is asked about; those of a recorded run are long past."""
         picture = self.run.picture
-        if picture.setback is None or picture.is_recorded or picture.why_not_written:
+        is_asked = isinstance(picture.setback, events.Failed) and picture.setback.is_of_a_question
+        if picture.setback is None or is_asked or picture.is_recorded or picture.why_not_written:
             return None
         return fault_view(picture.setback)
 

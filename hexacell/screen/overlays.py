@@ -88,7 +88,9 @@ class AnswerOverlay(ModalScreen[ScreenResultType]):
                 line = f"  {'--' if is_refused else key:8} {choice.label}"
                 yield TextPanel(line, classes="choice refused" if is_refused else "choice")
             if view.typed and not view.refusal:
-                yield Input(placeholder=view.typed, id="typed", compact=True, max_length=LONGEST_TYPED)
+                yield Input(
+                    placeholder="type the name here", id="typed", compact=True, max_length=LONGEST_TYPED
+                )
 
     def on_mount(self) -> None:
         """What is typed goes into the field, if there is one."""

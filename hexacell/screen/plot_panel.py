@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 COLOURS = ("primary", "warning", "success")
 """Of the series, in turn; markers tell them apart without colours."""
 
+LEVEL_STEPS = 400
+"""Characters of the line of a limit, more than any screen is wide: it is in the row of what equals it."""
+
 AROUND = 0.04
 """Free room at the ends of each axis, as a share of it."""
 
@@ -42,7 +45,7 @@ class PlotPanel(Vertical):
 
     def __init__(self, *, id: str | None = None, classes: str = "") -> None:  # noqa: A002 - as in every widget
         super().__init__(id=id, classes=f"panel {classes}")
-        self._view: PlotView | None = None
+        self._drawn: tuple[PlotView, str] | None = None
         self._across = (0.0, 1.0)
 
     def on_resize(self) -> None:
@@ -61,9 +64,9 @@ class PlotPanel(Vertical):
         """Show a view."""
         plot: PlotWidget = self.query_one(".plot")  # type: ignore[assignment]  # see compose
         # As it is mounted it forgets what it was given before.
-        if view == self._view or not plot.is_mounted:
+        if (view, self.app.theme) == self._drawn or not plot.is_mounted:
             return
-        self._view = view
+        self._drawn = (view, self.app.theme)
         self.border_title = view.title
         self.border_subtitle = "" if view.is_empty else f"{view.legend}   → {view.x_label}"
         note = self.query_one(".plot-note", TextPanel)
@@ -74,8 +77,6 @@ class PlotPanel(Vertical):
             self._draw(plot, view)
 
     def _draw(self, plot: PlotWidget, view: PlotView) -> None:
-        from textual_plot import HiResMode  # noqa: PLC0415 - see above
-
         plot.clear()
         up = log10 if view.is_logarithmic else float
         points = [[(x, up(y)) for x, y in one.points] for one in view.series]
@@ -90,7 +91,8 @@ class PlotPanel(Vertical):
         self.on_resize()
         colours = self.app.theme_variables
         if level is not None:
-            plot.plot(xs, (level, level), colours["error"], HiResMode.BRAILLE)
+            along = [xs[0] + (xs[1] - xs[0]) * step / LEVEL_STEPS for step in range(LEVEL_STEPS + 1)]
+            plot.scatter(along, [level] * len(along), "┄", colours["error"])
         for number, (one, some) in enumerate(zip(view.series, points, strict=True)):
             if some:
                 colour = colours[COLOURS[number % len(COLOURS)]]

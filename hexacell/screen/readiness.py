@@ -39,14 +39,19 @@ class Readiness:
 
     def checklist(self, live: LiveSnapshot | None) -> dict[str, tuple[Any, ...]]:
         """The parts of the checklist's screen."""
-        if (checked := self.checked) is None:
-            checked = checked_items(Mark.BUSY if self.is_checking else Mark.OPEN)
-        items = (*live_items(live, is_checking=self.is_checking), *checked)
+        items = self.items(live)
         lines = [(summary(items), Urgency.CALM)]
         lines += [line for item in items for line in item.lines(is_unfolded=self._is_unfolded)]
         said = self._tried.lines if self._tried else ()
         plan = plan_lines(self._workplace.cell.settings, said, is_trying=self._trial is not None)
         return {"checklist": (lines,), "plan": (plan,)}
+
+    def items(self, live: LiveSnapshot | None) -> tuple[ChecklistItem, ...]:
+        """All that must hold, first what does not."""
+        if (checked := self.checked) is None:
+            checked = checked_items(Mark.BUSY if self.is_checking else Mark.OPEN)
+        every = (*live_items(live, is_checking=self.is_checking), *checked)
+        return tuple(sorted(every, key=lambda one: one.mark is not Mark.FAILED))
 
     def poses(self) -> dict[str, tuple[Any, ...]]:
         """The parts of the plan's screen."""

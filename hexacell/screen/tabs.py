@@ -145,7 +145,7 @@ class HistoryScreen(TabScreen):
     AUTO_FOCUS = "#runs"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("v", "about('compare')", "Compare"),
-        Binding("b", "about('roll back')", "Restore or undo"),
+        Binding("b", "about('roll back')", "Go back to it"),
         Binding("w", "write", "Write its proposal"),
         Binding("o", "app.perform('drift')", "Drift"),
     ]
@@ -158,7 +158,7 @@ class HistoryScreen(TabScreen):
         with Horizontal(id="sides"):
             yield titled(widgets.ChoiceTable(RUN_COLUMNS, id="runs"), "Runs, the latest first")
             yield PlotPanel(id="trend")
-        yield titled(widgets.TextList(id="comparison"), "What was asked")
+        yield titled(widgets.TextList(id="comparison"), "Answer")
 
     def draw(self, model: ScreenModel, has_effect: Callable[[str], bool]) -> None:
         """Show what is so now."""

@@ -88,6 +88,10 @@ class TextList(VerticalScroll):
         self._panel.show([(one, Urgency.CALM) if isinstance(one, str) else one for one in lines])
 
 
+SIGNS = {Urgency.CALM: "", Urgency.GOOD: "✓ ", Urgency.ATTENTION: "▸ ", Urgency.ALARM: "✗ "}
+"""Before the word of a banner: its colour is not all that tells how urgent it is."""
+
+
 class BannerBar(Horizontal):
     """The state in a word, and beside it what to do, what comes next, and how long it takes."""
 
@@ -98,7 +102,7 @@ class BannerBar(Horizontal):
 
     def show(self, banner: Banner) -> None:
         """Show a banner."""
-        self._word.show(banner.word, banner.urgency)
+        self._word.show(f"{SIGNS[banner.urgency]}{banner.word}", banner.urgency)
         self._action.show(banner.action)
         self._following.show(banner.following)
         self._rest.show(banner.rest)

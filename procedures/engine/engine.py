@@ -58,6 +58,7 @@ class Engine:
         )
         self._is_prepared = False
         self._last: events.Event | None = None
+        self._trip: events.Tripped | None = None
         self.state = fold(journal.events)
 
     @property
@@ -114,6 +115,8 @@ class Engine:
         self._journal.append(event)
         self.state = apply(self.state, event)
         self._last = event
+        if isinstance(event, events.Tripped | events.StepBegun):  # of the step that is being executed
+            self._trip = event if isinstance(event, events.Tripped) else None
         for listener in self._listeners:
             listener(event, self.state)
         return self.state
@@ -180,8 +183,8 @@ class Engine:
         raised = error
         try:
             stop_failure = await self._halt()
-            if isinstance(error, GuardTripped):
-                self._record_if_possible(events.Tripped.of(error.trip))
+            if isinstance(error, GuardTripped) and self._trip != (trip := events.Tripped.of(error.trip)):
+                self._record_if_possible(trip)
             if reversal := revert_at_end(self.state, error):
                 raised = await self._revert(reversal, error)
             if stop_failure and isinstance(raised, HexacellError) and not may_still_move(raised):

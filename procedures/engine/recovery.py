@@ -135,9 +135,9 @@ class Recovery:
                     raise error  # without a person nothing is tried while the robot may still move
                 unstopped = error if may_still_move(error) else RobotNotStopped(stop_failure, error)
                 failure = failure.model_copy(update={"reason": str(unstopped)})
-            if (decided := await self._decide(failure)) is None:
+            if (decided := await self._decide(failure, error)) is None:
                 raise error
-            if isinstance(error, GuardTripped):
+            if isinstance(error, GuardTripped) and not decided.asked:
                 self.record(events.Tripped.of(error.trip))
             state = self.record(decided)
             self.commands.set_flags(fault=None)
@@ -150,10 +150,12 @@ class Recovery:
             else:
                 return
 
-    async def _decide(self, failure: events.Failed) -> events.Failed | None:
+    async def _decide(self, failure: events.Failed, error: errors.HexacellError) -> events.Failed | None:
         """The failure with the action to take, chosen by a person if need be; None to end the run."""
         if failure.action is not Action.ASK:
             return failure
+        if isinstance(error, GuardTripped):
+            self.record(events.Tripped.of(error.trip))
         self.record(failure)  # when it was, not only when it is answered
         question = ask_recovery(failure.reason, choices(failure))
         try:

@@ -217,6 +217,11 @@ class Failed(BaseEvent):
     action: Action
     asked: bool = False
 
+    @property
+    def is_of_a_question(self) -> bool:
+        """Whether a person is asked, or was."""
+        return self.asked or self.action is Action.ASK
+
     def applied_to(self, state: RunState) -> RunState:
         """A ball that left its plate on the way to a chosen pose is a rejected record.
 

@@ -11,6 +11,7 @@ from textual.widgets import Input
 
 from hexacell.cell.limits import ExclusionSettings
 from hexacell.cell.loader import Cell, load_cell
+from hexacell.cell.recovery import Action, FailureKind
 from hexacell.errors import FileError
 from hexacell.kinematics.pose import Pose
 from hexacell.run_process.messages import StatusChanged
@@ -24,8 +25,7 @@ from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy
 from procedures.engine.command_loop import Status
 from procedures.run.keys import Phase, SetKey
-from procedures.run.questions import PendingChange, ask_approval, ask_placement
-from procedures.run.trips import Guard
+from procedures.run.questions import PendingChange, ask_approval, ask_placement, ask_recovery
 from procedures.steps import events
 from tests.screen.conftest import SNAPSHOTS, UPDATE, compare_with_snapshot
 from tests.screen.test_found_terms import told
@@ -71,14 +71,12 @@ def idle(cell: Cell) -> ToldWorkplace:
     )
     return ToldWorkplace(
         cell,
-        live=[snapshot(y={"problem": "gauge y: it does not answer. Look at its cable"})],
+        live=[snapshot(y={"problem": "gauge y: it does not answer. Look at its cable", "age_s": 12.0})],
         entries=entries,
         preflight=Preflight(
             items=(
-                ChecklistItem(
-                    Mark.FAILED, "gauge y", "it answers in inch", "Press the in/mm key, then Enter"
-                ),
                 ChecklistItem(Mark.DONE, "points and poses within reach"),
+                ChecklistItem(Mark.FAILED, "disk", "48 MB are free, a run needs 200", "Free some"),
             ),
             is_ready=False,
         ),
@@ -87,7 +85,7 @@ def idle(cell: Cell) -> ToldWorkplace:
                 "55 records will give about 0.062 mm at the worst of your task poses, in about 24 minutes.",
             )
         ),
-        compared=("changed most: B2y by +0.021 mm (sigma 0.009)", "compared with"),
+        compared=("Since the run before, B2y changed most: by +0.021 mm (sigma 0.009). Compared:",),
     )
 
 
@@ -123,13 +121,22 @@ def scene_measure(cell: Cell, history: History) -> Opening:
 def scene_review(cell: Cell, history: History) -> Opening:
     run, workplace = running(cell, told(history), len(history))
     run.tell(StatusChanged(status=Status.ENDED))
+    accepted = cell.settings.acceptance.model_copy(update={"position_mm": 0.25})
+    workplace.cell = replace(cell, settings=cell.settings.model_copy(update={"acceptance": accepted}))
     return workplace, {"review": ("4",)}
 
 
 def scene_place(cell: Cell, history: History) -> Opening:
     run, workplace = running(cell, history, 5)
     run.tell(
-        snapshot(x={"shown_mm": -1.2}, z={"shown_mm": None, "age_s": None, "problem": "gauge z: silent"})
+        snapshot(
+            x={"shown_mm": -1.2},
+            z={
+                "shown_mm": None,
+                "age_s": None,
+                "problem": "gauge z: it does not answer. Look at its cable",
+            },
+        )
     )
     run.ask(ask_placement(SetKey(phase=Phase.IDENTIFY, point=1), Pose(0.0, 0.0, 550.0)))
     return workplace, {"place": ()}
@@ -141,7 +148,7 @@ def scene_approve(cell: Cell, history: History) -> Opening:
     far = AcceptanceGate(
         name="within tolerance",
         passed=False,
-        sentence="Beyond the drawing's tolerance: B3 z (+8.21 mm).",
+        sentence="Beyond the drawing's tolerance: B3 z (+5.21 mm).",
         needs_person=True,
         needs_cell_name=True,
     )
@@ -152,9 +159,12 @@ def scene_approve(cell: Cell, history: History) -> Opening:
 
 def scene_fault(cell: Cell, history: History) -> Opening:
     run, workplace = running(cell, history, MEASURED)
-    problem = "its plunger is at the end of its travel"
-    action = "Move the gauge by 3.8 mm along +y, then answer the question"
-    run.record([events.Tripped(guard=Guard.GAUGE_END, device="gauge y", problem=problem, action=action)])
+    problem = "gauge y: its plunger is at the end of its travel. Move the gauge by 3.8 mm along +y"
+    failed = {"failure": FailureKind.GAUGE_AT_END, "attempt": 1, "reason": problem, "action": Action.ASK}
+    run.record([events.Failed(step=None, **failed)])
+    run.tell(snapshot(y={"shown_mm": -6.1904}))
+    run.ask(ask_recovery(problem, (Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ABORT)))
+    run.tell(StatusChanged(status=Status.FAULTED))
     return workplace, {"fault": ()}
 
 
@@ -183,7 +193,7 @@ async def test_the_assistant_looks_as_it_did_and_leaving_it_writes_nothing(size,
         await until_shown(pilot, "Question 1 of")
         app.screen.query_one(Input).value = ""
         await pilot.press("enter")
-        await until_shown(pilot, "must be text that is not empty")
+        await until_shown(pilot, "Please type an answer.")
         await compare_with_snapshot(f"assistant-{size}-dark", pilot)
         await pilot.press("x", "enter", "ctrl+q")
         await until(lambda: app.return_code is not None)

@@ -79,10 +79,10 @@ class ToldRun:
             self._waiting.put_nowait(message)
 
     def record(self, history: Iterable[Event]) -> None:
-        """Tell events, five seconds apart."""
+        """Tell events, two seconds apart."""
         for event in history:
             self.events += 1
-            at = BEGUN + timedelta(seconds=5 * self.events)
+            at = BEGUN + timedelta(seconds=2 * self.events)
             self.tell(EventRecorded(sequence=self.events, at=at, event=event))
 
     def begin(self, cell: Cell) -> None:

@@ -9,6 +9,7 @@ from hexacell.text.screens.questions import question_view
 from hexacell.text.screens.run_picture import RunPicture
 from hexacell.text.screens.time_left import remaining
 from hexacell.text.screens.views import Banner, ChecklistItem, Mark, Urgency
+from hexacell.text.verdict import teaching_line
 from hexacell.verdict.decision import Verdict
 from procedures.engine.command_loop import Status
 from procedures.run.keys import Phase, SetKey
@@ -48,7 +49,7 @@ def run_banner(picture: RunPicture, settings: CellSettings | None) -> Banner:
         return Banner(word, _capital(_recorded(picture)), _following(picture, settings), rest, urgency)
     if picture.status is Status.ENDED:
         return _ended(picture)
-    rest = ". ".join(filter(None, (remaining(picture, settings), _stopping(picture))))
+    rest = ". ".join(filter(None, (remaining(picture, settings), _watching(picture))))
     if picture.question is not None:
         return _asked(picture, rest)
     word, action, urgency = _word(picture), f"Nothing to do: {_doing(picture)}", Urgency.CALM
@@ -74,7 +75,9 @@ def _ended(picture: RunPicture) -> Banner:
         if found is not None and (accuracy := found.accuracy) is not None:
             error = error_with_u(accuracy).replace("+-", "±")
             line = f"Position error {error} mm at the task poses, limit {accuracy.position.limit:g} mm"
-        following = "4 Review shows the result, 5 History all runs."
+        kept = picture.state.proposed if picture.state.committed and not picture.state.rolled_back else None
+        teach = "" if kept is None or kept.displacement is None else f"{teaching_line(kept.displacement)}."
+        following = teach or "4 Review shows the result, 5 History all runs."
         return Banner(word, line, following, "Nothing moves.", verdict_urgency(verdict))
     if why := picture.why_not_written:
         following = "Press 5: w there writes its proposal after all; 2 and r ask again."
@@ -96,7 +99,8 @@ def _asked(picture: RunPicture, rest: str) -> Banner:
     if not picture.may_command:
         return Banner("WAITING", "Nothing to do: a question waits for who is in control", view.title, rest)
     action = f"{view.title} Press w" if view.title.endswith("?") else f"{view.title}: press w"
-    return Banner("YOUR TURN", action, "".join(view.paragraphs[:1]), rest, view.urgency)
+    word = "STOPPED" if picture.status is Status.FAULTED else "YOUR TURN"
+    return Banner(word, action, "".join(view.paragraphs[:1]), rest, view.urgency)
 
 
 def _word(picture: RunPicture) -> str:
@@ -144,11 +148,11 @@ def _after_set(state: RunState, at: SetKey, settings: CellSettings | None) -> st
     return "identifying the geometry" if is_identifying else "the next part of the run"
 
 
-def _stopping(picture: RunPicture) -> str:
+def _watching(picture: RunPicture) -> str:
     control = picture.control
-    if control is not None and not control.is_in_control:
-        return f"You only watch: {control.who or 'nobody'} is in control; c takes over"
-    return "" if picture.status is Status.PAUSED else "p pauses, P at once, a ends the run"
+    if control is None or control.is_in_control:
+        return ""
+    return f"You only watch: {control.who or 'nobody'} is in control; c takes over"
 
 
 def cell_banner(live: LiveSnapshot | None, problem: str) -> Banner:
@@ -167,21 +171,21 @@ def cell_banner(live: LiveSnapshot | None, problem: str) -> Banner:
 
 
 def preflight_banner(
-    checked: Sequence[ChecklistItem] | None, *, is_checking: bool, is_running: bool
+    items: Sequence[ChecklistItem], *, is_checked: bool, is_checking: bool, is_running: bool
 ) -> Banner:
-    """What to do before a run; ``checked`` is what was found, None if nobody has looked."""
+    """What to do before a run; ``is_checked``: whether somebody has looked at all ``items``."""
     rest = "Everything is looked at again before the first move."
     if is_running:
         return Banner("RUN GOES ON", "Press 3 to see it", rest=rest)
     if is_checking:
         return Banner("LOOKING", "Nothing to do: this takes some seconds, and nothing moves")
-    if checked is None:
+    if not is_checked:
         return Banner("TO CHECK", "Press Enter to look at everything; nothing moves", rest=rest)
-    failed = [one for one in checked if one.mark is Mark.FAILED]
+    failed = [one for one in items if one.mark is Mark.FAILED]
     if failed:
         first, more = failed[0], f"; {len(failed) - 1} more below" if len(failed) > 1 else ""
-        action = _capital(first.action or f"{first.name}: {first.finding}")
-        return Banner("NOT READY", action, f"Then Enter looks again{more}.", rest, Urgency.ALARM)
+        action = f"{_capital(first.name)}: {first.action or first.finding}"
+        return Banner("NOT READY", action, f"Then press Enter to look again{more}.", rest, Urgency.ALARM)
     following = "k starts a check, which changes nothing; v tries the plan first."
     return Banner("READY", "Press s to start the calibration", following, rest, Urgency.GOOD)
 
@@ -193,7 +197,9 @@ def history_banner(runs: int | None) -> Banner:
     if not runs:
         return Banner("NO RUNS", "Press 2, look at everything, and start one with s")
     return Banner(
-        "HISTORY", "Choose a run: Enter shows it again", "b restores the config it wrote, or undoes it."
+        "HISTORY",
+        "Choose a run: Enter shows it again",
+        "b goes back to the config that it wrote; for the run in the controller, to the one before.",
     )
 
 

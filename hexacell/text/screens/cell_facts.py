@@ -10,8 +10,8 @@ def cell_facts(cell: Cell) -> Iterator[str]:
     settings = cell.settings
     controller, plan, limits = settings.controller, settings.identification, settings.acceptance
     yield f"robot       {settings.robot.mechanism}"
-    files = ", ".join(one.name for one in cell.config_paths)
-    yield f"controller  {controller.protocol}, its geometry in {files}"
+    yield f"controller  {controller.protocol}"
+    yield f"its config  {', '.join(one.name for one in cell.config_paths)}"
     gauges = ", ".join(
         f"{'+' if one.sign > 0 else '-'}{one.axis} {one.protocol}" for one in settings.gauges
     )
@@ -19,5 +19,3 @@ def cell_facts(cell: Cell) -> Iterator[str]:
     yield f"encoders    {settings.encoders.protocol}"
     yield f"plan        {len(plan.points)} points, {plan.orientations} orientations each"
     yield f"limit       {limits.position_mm:g} mm and {limits.orientation_deg:g} deg at the task poses"
-    if settings.simulation is not None:
-        yield "            SIMULATED: everything here is a simulation"

@@ -75,7 +75,7 @@ def summary(items: Sequence[ChecklistItem]) -> str:
 
 
 NOT_TRIED = "v in 2 Preflight tries the plan; then its poses are here."
-EVERYTHING = "These poses were measured on a simulated robot; a real one is sent to others near them."
+EVERYTHING = "Nothing to do, unless you exclude some: simulated; the robot is sent to poses near these."
 
 
 def plan_note(planned: Sequence[VisitedPose], *, is_trying: bool) -> str:

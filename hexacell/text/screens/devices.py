@@ -62,7 +62,7 @@ def _encoder_card(encoders: Shown[EncoderSample], later_s: float) -> Card:
     if (sample := encoders.value) is None:
         return Card("encoders", "waiting", Urgency.ATTENTION, "- - -")
     numbered = [f"{number} {position:+9.3f}" for number, position in enumerate(sample.positions, start=1)]
-    lines = [f"{left} {right}" for left, right in zip(numbered[:3], numbered[3:], strict=True)]
+    lines = [f"{left}   {right}" for left, right in zip(numbered[:3], numbered[3:], strict=True)]
     return Card("encoders", "ok", Urgency.GOOD, f"six positions, {sample.unit}", (*lines, f"{age} ago"))
 
 

@@ -81,6 +81,8 @@ class FirstCellAssistant:
         answers = self._draft.answers()
         name = answers[self._number].name
         self.problem = self._draft.problem(name, given)
+        if self.problem and not given.strip():
+            self.problem = "Please type an answer."
         if self.problem:
             return
         self._draft.given[name] = given

@@ -19,7 +19,7 @@ with the latest run that was interrupted. In a cell with a fixture of known leng
 scale, and L calibrates and checks it before the verdict. Everything is looked at again before the first \
 move. i shows which devices answered.""",
     "measure": """\
-What happens now, what is next, how long it takes with the people who place the gauges, and how to stop. \
+The banner says what happens now, what is next, and how long it takes with the people who place gauges. \
 Each gauge shows its deviation from the reference, and where its plunger stands in its travel. A record \
 lands with what it is off: measured less predicted, or less what the fit says once there is one, the \
 largest of x, y and z, and how many sigma that is. More than 4 sigma is marked and deserves a look; Enter \

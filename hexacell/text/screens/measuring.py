@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 from hexacell.cell.model import CellSettings
-from hexacell.cell.recovery import Action
 from hexacell.lengths import from_to
 from hexacell.run_process.messages import HostFailed
 from hexacell.text.screens.questions import RECOVERIES
@@ -64,6 +63,8 @@ def progress(picture: RunPicture, settings: CellSettings | None) -> Progress:
     place = f"{PHASES[at.phase]}: point {at.point} of {points}, record {max(1, taken)} of about {records}"
     if at.phase is Phase.LENGTH:
         place = f"{PHASES[at.phase]}: mounting {at.point}"
+    if planned:
+        place += f"; reading {done} of {planned} of the run"
     return Progress(place, done, planned)
 
 
@@ -142,9 +143,10 @@ def fault_view(setback: Setback) -> FaultView:
             where = f"{device}: " if device else ""
             return FaultView(f"Stopped by a guard: {guard.value}", f"{where}{problem}", action)
         case events.Failed(reason=reason, attempt=attempt, action=action):
-            does = f"Nothing: {RECOVERIES.get(action.value, '')} is under way (attempt {attempt})."
-            what_to_do = "Choose how to continue." if action is Action.ASK else does
-            return FaultView("A step failed, the robot was stopped", reason, what_to_do)
+            does = (
+                f"Nothing: {RECOVERIES.get(action.value, action.value)} is under way (attempt {attempt})."
+            )
+            return FaultView("A step failed, the robot was stopped", reason, does)
         case events.Interrupted(reason=reason):
             return FaultView("The run ended early", reason, RESUMABLE)
         case HostFailed(problem=problem, action=action, exit_code=exit_code):

@@ -14,9 +14,9 @@ NOTHING_ASKED = (
 )
 
 RUN_COLUMNS = (
-    Column("run", 20),
+    Column("run", 21),
     Column("what", 13),
-    Column("verdict", 17),
+    Column("verdict", 18),
     Column("error ± U, mm", 16),
     Column("controller", 13),
 )

@@ -56,8 +56,10 @@ def _rows_of(gauge: GaugeSnapshot, mounting_mm: float, urgency: Urgency) -> tupl
 
 def mounting_advice(gauge: GaugeSnapshot, mounting_mm: float) -> str:
     """What to do with a gauge that is being placed."""
-    if gauge.problem or gauge.shown_mm is None:
-        return "it does not answer"
+    if gauge.problem:
+        return gauge.problem.removeprefix(f"gauge {gauge.name}: ")
+    if gauge.shown_mm is None:
+        return "no answer yet"
     if (place := plunger_place(gauge)) is None:
         return "set it to mid travel by eye"
     if abs(place) <= mounting_mm:
@@ -97,9 +99,9 @@ def _gauge_pieces(gauge: GaugeSnapshot) -> tuple[tuple[int, int, str], ...]:
         case "x", False:
             return ((0, -12, "▐██▌━━━▶"), (-1, -11, name))
         case "y", True:
-            return ((-2, 3, "/"), (-3, 4, "/"), (-4, 5, "▟█▛"), (-5, 6, f"▟█▛ {name}"))
+            return ((-2, 3, "↙"), (-3, 4, "/"), (-4, 5, "▟█▛"), (-5, 6, f"▟█▛ {name}"))
         case "y", False:
-            return ((2, -4, "/"), (3, -5, "/"), (4, -7, "▟█▛"), (5, -8, f"▟█▛ {name}"))
+            return ((2, -4, "↗"), (3, -5, "/"), (4, -7, "▟█▛"), (5, -8, f"▟█▛ {name}"))
         case "z", True:
             return ((-5, -1, "██"), (-4, -1, f"██ {name}"), (-3, -1, "┃"), (-2, -1, "▼"))
         case _:

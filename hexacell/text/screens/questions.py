@@ -31,7 +31,7 @@ def question_view(
             return _placement(place, live)
         case questions.PendingChange(gates=gates, displacement=moved, improvement=improvement) as pending:
             gain = improvement_sentence(improvement)
-            lines = "\n".join(f"{'ok' if gate.passed else 'NO'}  {gate.sentence}" for gate in gates)
+            lines = "\n".join(map(_gate_line, gates))
             facts = teaching_sentence(moved), gain, found_sentence(pending.found), lines
             title = "Write the new geometry into the controller's config?"
             view = _consenting(question, person, "write it", title)
@@ -133,6 +133,12 @@ def again_question(record: str) -> QuestionView:
             Choice("n", "no, keep it", None),
         ),
     )
+
+
+def _gate_line(gate: AcceptanceGate) -> str:
+    if gate.passed or not gate.needs_person:
+        return f"{'ok' if gate.passed else 'NO'}  {gate.sentence}"
+    return f"?   {gate.sentence} This is for you to decide."
 
 
 def approval_refusal(gates: tuple[AcceptanceGate, ...]) -> str:

@@ -124,9 +124,7 @@ def _with_event(picture: RunPicture, message: messages.EventRecorded) -> RunPict
         case events.CommandRejected():
             return replace(picture, refusal=event, refusals=picture.refusals + 1)
         case events.Tripped() | events.Failed() | events.Interrupted():
-            is_known = isinstance(event, events.Failed) and event.asked
-            picture = replace(picture, setback=event) if is_known else _with_setback(picture, event)
-            return replace(picture, step=None)
+            return replace(_with_setback(picture, event), step=None)
         case _:
             return picture
 

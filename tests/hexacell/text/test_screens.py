@@ -1,6 +1,7 @@
 """The words of the screens: gauges that are being placed, questions, guidance, faults, records."""
 
 from datetime import UTC, datetime, timedelta
+from functools import partial
 from pathlib import Path
 
 from hypothesis import given
@@ -72,8 +73,8 @@ def test_a_gauge_says_how_it_is_to_be_moved() -> None:
         ({"shown_mm": -1.2, "sign": -1}, "move it 1.2 mm in, along +x"),
         ({"shown_mm": 3.4, "middle_mm": 3.0}, "in place, 0.4 mm from mid travel"),
         ({"middle_mm": None}, "set it to mid travel by eye"),
-        ({"shown_mm": None}, "it does not answer"),
-        ({"problem": "silent"}, "it does not answer"),
+        ({"shown_mm": None}, "no answer yet"),
+        ({"problem": "silent"}, "no answer yet"),
     ]
     assert [mounting_advice(gauge(**changes), 1.0) for changes, _ in moves] == [said for _, said in moves]
 
@@ -154,9 +155,10 @@ def test_what_is_to_be_mended_comes_before_everything_else() -> None:
     assert (banner.action, banner.following) == ("Gauge x: silent", "1 more below.")
     failed = ChecklistItem(Mark.FAILED, "gauge y", "it answers in inch", "Press the in/mm key")
     ready = ChecklistItem(Mark.DONE, "gauge x")
-    assert preflight_banner((ready, failed), is_checking=False, is_running=False).action == failed.action
-    assert preflight_banner((ready,), is_checking=False, is_running=False).action.startswith("Press s")
-    assert preflight_banner(None, is_checking=False, is_running=False).action.startswith("Press Enter")
+    checked = partial(preflight_banner, is_checked=True, is_checking=False, is_running=False)
+    assert checked((ready, failed)).action == "Gauge y: Press the in/mm key"
+    assert checked((ready,)).action.startswith("Press s")
+    assert checked((failed,), is_checked=False).action.startswith("Press Enter")
 
 
 def test_a_record_has_what_it_is_off_and_how_many_sigma_that_is_and_far_ones_are_marked() -> None:

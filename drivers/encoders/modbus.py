@@ -67,11 +67,10 @@ def counts_in(
     found = {}
     for leg in span.legs:
         start = REGISTER_BYTES * (described.registers[leg - 1] - span.first)
-        places = range(start, start + described.bits // 8, REGISTER_BYTES)
-        registers = [data[place : place + REGISTER_BYTES] for place in places]
+        own = data[start : start + described.bits // 8]
         if described.word_order == "little":
-            registers.reverse()
-        found[leg] = int.from_bytes(b"".join(registers), signed=signed)
+            own = own[REGISTER_BYTES:] + own[:REGISTER_BYTES]
+        found[leg] = int.from_bytes(own, signed=signed)
     return found
 
 

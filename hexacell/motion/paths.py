@@ -156,7 +156,8 @@ def _path(lines: CheckedLines, waypoints: tuple[PoseBatch, ...], row: int) -> Pa
     """One of the lines as a path, with one of n poses of each waypoint; None if it is not clear."""
     if not lines.is_clear[row]:
         return None
-    return Path(tuple(waypoint.pose(row) for waypoint in waypoints), *lines.traced(row))
+    commands = tuple(waypoint.pose(row) for waypoint in waypoints)
+    return Path(commands, lines.actual[1:, [row]].in_shape(-1), lines.joints[1:, row])
 
 
 def find_route(

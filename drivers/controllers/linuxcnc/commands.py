@@ -145,7 +145,11 @@ class ControllerCommands:
         try:
             return parse_positions(text)
         except ValueError as error:
-            raise DeviceError(str(error), subject=self.subject) from error
+            raise self.error(str(error)) from error
+
+    def error(self, problem: str, action: str | None = None) -> DeviceError:
+        """The error for what the controller does, without a reaction of its own."""
+        return self.connection.error(DeviceError, problem, action)
 
 
 class CommandChannel:

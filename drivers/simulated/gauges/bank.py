@@ -40,7 +40,7 @@ class SimulatedGaugeBank(ServedGroup):
     others than those that are announced, by protocol; a protocol without any is a ``FileError``.
 
     Attributes:
-        gauges: the settings with the ports on which the gauges are served.
+        gauges: the settings with the ports on which the gauges are served, and their ``lines`` by name.
     """
 
     def __init__(
@@ -56,19 +56,16 @@ class SimulatedGaugeBank(ServedGroup):
         self._settings = settings
         self._clock = clock
         self._channels: dict[str, int] = {}
-        self._lines: dict[str, GaugeLineServer] = {}
+        self.lines: dict[str, GaugeLineServer] = {}
         with ExitStack() as served:
             for group in self._by_line(gauges):
                 line = served.enter_context(self._serve(group))
-                self._lines |= {gauge.name: line for gauge in group}
+                self.lines |= {gauge.name: line for gauge in group}
             self._served = served.pop_all()
-        self.gauges = tuple(one.model_copy(update={"port": self.line(one.name).address}) for one in gauges)
-
-    def line(self, gauge: str) -> GaugeLineServer:
-        return self._lines[gauge]
+        self.gauges = tuple(one.model_copy(update={"port": self.lines[one.name].address}) for one in gauges)
 
     def faults(self, gauge: str) -> dict[FaultKind, Switch]:
-        line, indicator = self._lines[gauge], self.indicators[gauge]
+        line, indicator = self.lines[gauge], self.indicators[gauge]
         return {
             "unplugged": line.set_unplugged,
             "silent": line.set_silent,

@@ -174,16 +174,13 @@ class DbcSession(BankSession):
             for one in self._signals
         )
         self._bus = EncoderBus(bus_settings(settings), closing, trace, self._accepts)
+        self.close = self._bus.close
 
     def start(self) -> None:
         """Listen to all six, and take a first sample."""
         for frame in self._frames:
             self._bus.network.subscribe(frame.number, self._receiver(frame))
         self._sample()
-
-    def close(self) -> None:
-        """Close the bus."""
-        self._bus.close()
 
     def _accepts(self, message: can.Message) -> bool:
         frame = FrameId(message.arbitration_id, message.is_extended_id)

@@ -98,11 +98,8 @@ class ModbusSession(BankSession):
         line = {**LINE, **described.serial, "settle_s": described.settle_s}
         self._port = ModbusPort(self._url, line, closing, trace)
         self._port.subject = "encoders"
+        self.close = self._port.close
         self._answering, self._has_sampled = set[int](), False
-
-    def close(self) -> None:
-        """Close the line."""
-        self._port.close()
 
     def start(self) -> None:
         """Open the line, and read; some devices refuse a request with registers that they do not have."""

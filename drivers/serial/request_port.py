@@ -97,18 +97,14 @@ WORST_LATENCY_S = 2.0
 class NoAnswer(Exception):
     """No complete frame in time; ``received`` is what came, ``beside_echo`` without the request's echo.
 
-    Never shown to users.
+    ``is_echoed``: the request came back. Never shown to users.
     """
 
     def __init__(self, received: bytes, request: bytes) -> None:
         self.received = received
         self.beside_echo = received.replace(request, b"") if request else received
+        self.is_echoed = self.beside_echo != received
         super().__init__(received)
-
-    @property
-    def is_echoed(self) -> bool:
-        """Whether the request came back."""
-        return self.beside_echo != self.received
 
 
 @dataclass(eq=False)

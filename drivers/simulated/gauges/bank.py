@@ -68,7 +68,7 @@ class SimulatedGaugeBank(ServedGroup):
         line, indicator = self.lines[gauge], self.indicators[gauge]
         return {
             "unplugged": line.set_unplugged,
-            "silent": line.set_silent,
+            "silent": setting(line, "is_silent"),
             "at its end": setting(indicator, "is_at_end"),
             "off its plate": indicator.set_pushed,
             "off its middle": setting(indicator, "off_middle_mm", OFF_MIDDLE_MM, 0.0),

@@ -31,8 +31,7 @@ class Origin(Enum):
 class StreamingGauge(ValueOnlyGauge):
     """A gauge that nobody asks. Several may send on one line, each with its channel.
 
-    Attributes:
-        usual_delay_s: how long ago a value may have been measured when it comes, unless the cell file says.
+    A value may have been measured ``usual_delay_s`` before it comes, unless the cell file says how long.
     """
 
     value_request = terminator = b""

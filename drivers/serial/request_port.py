@@ -42,11 +42,9 @@ def is_copies(surplus: bytes, frame: bytes) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class StreamedFrame:
-    """A line of text without its end.
+    """A line of text without its end; ``number`` counts from 1.
 
-    Attributes:
-        number: of the frame, counted from 1.
-        began_after_s: its first byte came after this time, s of the port's clock.
+    Its first byte came after ``began_after_s``, s of the port's clock.
     """
 
     number: int

@@ -42,11 +42,9 @@ rotations are large and the ball moves fastest."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Path:
-    """A path that keeps joint ranges, singularity margin and gauge travel.
+    """A path that keeps joint ranges, singularity margin and gauge travel, over commands as waypoints.
 
-    Attributes:
-        waypoints: commands between its ends.
-        poses: actual poses (m) of the estimated robot along it, and their ``joints`` (m, 6), mm.
+    ``poses`` are the actual ones (m) of the estimated robot along it, ``joints`` theirs (m, 6), mm.
     """
 
     waypoints: tuple[Pose, ...]

@@ -155,8 +155,7 @@ class ControllerCommands:
 class CommandChannel:
     """A connection that is opened when it is needed, and replaced after it broke.
 
-    Attributes:
-        commands: the current connection, if there is one.
+    ``commands`` is the current one, if there is one.
     """
 
     def __init__(self, connect: Callable[[], Awaitable[ControllerCommands]]) -> None:

@@ -37,10 +37,8 @@ class SimulatedGaugeBank(ServedGroup):
 
     ``plungers`` give, by name of a gauge, the position of its plunger, mm from the middle of the travel, in
     the instrument's own direction, with noise; called from the threads of the lines. ``instruments`` are
-    others than those that are announced, by protocol; a protocol without any is a ``FileError``.
-
-    Attributes:
-        gauges: the settings with the ports on which the gauges are served, and their ``lines`` by name.
+    others than those that are announced, by protocol; a protocol without any is a ``FileError``. ``gauges``
+    are the settings with the ports on which they are served, ``lines`` the servers of these by name.
     """
 
     def __init__(

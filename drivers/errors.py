@@ -5,7 +5,6 @@ A failure without a reaction of its own is a plain :class:`hexacell.errors.Devic
 
 import functools
 import inspect
-from collections.abc import Awaitable, Callable
 from importlib import import_module
 from typing import Any, TypeVar, cast
 
@@ -143,9 +142,6 @@ class MotionInterrupted(DeviceError):
     """A motion ended, or was stopped, before its target."""
 
 
-PROJECT = "hexacell"
-
-
 def optional(module: str, extra: str, subject: str) -> Any:  # noqa: ANN401 - a module, of whatever type
     """The module of an optional library.
 
@@ -158,7 +154,7 @@ def optional(module: str, extra: str, subject: str) -> Any:  # noqa: ANN401 - a 
         raise UsageError(
             f"needs {module.partition('.')[0]}, which is not installed ({error})",
             subject=subject,
-            action=f"Type: pip install '{PROJECT}[{extra}]'",
+            action=f"Type: pip install 'hexacell[{extra}]'",
         ) from error
 
 
@@ -180,21 +176,20 @@ class _Translated:
     def __init__(self, device: object, subject: str) -> None:
         self._device, self._subject = device, subject
 
-    def __getattribute__(self, name: str) -> Any:  # noqa: ANN401
-        """Its class is the device's own: whoever asks what it is learns that."""
-        if name == "__class__":
-            return type(object.__getattribute__(self, "_device"))
-        return object.__getattribute__(self, name)
+    @property  # type: ignore[misc]
+    def __class__(self) -> type:
+        """The device's own: whoever asks what it is learns that."""
+        return type(self._device)
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - whatever the device has
         found = getattr(self._device, name)
-        return self._wrapped(found) if inspect.iscoroutinefunction(found) else found
+        if not inspect.iscoroutinefunction(found):
+            return found
 
-    def _wrapped(self, call: Callable[..., Awaitable[Any]]) -> Callable[..., Awaitable[Any]]:
-        @functools.wraps(call)
+        @functools.wraps(found)
         async def wrapped(*arguments: Any, **named: Any) -> Any:  # noqa: ANN401
             try:
-                return await call(*arguments, **named)
+                return await found(*arguments, **named)
             except HexacellError:
                 raise
             except Exception as error:

@@ -46,12 +46,9 @@ class GaugeReading:
 
 @dataclass(frozen=True, slots=True)
 class EncoderSample:
-    """Six joint variables sampled at one instant.
+    """Six joint variables ``positions`` (6,) sampled at one instant, in ``unit``, mm or deg.
 
-    Attributes:
-        counts: raw counts (6,), as the encoders send them.
-        positions: joint variables (6,), in ``unit``.
-        unit: mm or deg.
+    ``counts`` (6,) are the raw ones, as the encoders send them.
     """
 
     counts: tuple[int, ...]
@@ -95,11 +92,9 @@ class ControllerStatus:
 
 @dataclass(frozen=True, slots=True)
 class ReportedPosition:
-    """Where a controller has the robot.
+    """Where a controller has the robot: its pose by its own forward kinematics, mm and deg.
 
-    Attributes:
-        pose: by its own forward kinematics, mm and deg.
-        joints: its joint variables (6,), mm or deg; None where its protocol does not report them.
+    ``joints`` are its joint variables (6,), mm or deg; None where its protocol does not report them.
     """
 
     pose: Pose

@@ -38,8 +38,7 @@ class GaugeTwin(Protocol):
 class GaugeConformance(Suite[Gauge, GaugeTwin]):
     """Subclass it in a test file, name it ``Test...``, and say what is tested.
 
-    Attributes:
-        tolerance_mm: by how much a reading may differ from what the twin shows: half its last digit.
+    A reading may differ by ``tolerance_mm`` from what the twin shows: half its last digit.
     """
 
     tolerance_mm: float = 0.00051

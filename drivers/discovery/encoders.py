@@ -8,7 +8,6 @@ before anything is set.
 
 import re
 import threading
-from collections import Counter
 from collections.abc import Collection, Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass
@@ -92,27 +91,24 @@ class OverheardFrames:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._latest: dict[tuple[int, bool], bytes] = {}
-        self._counts = Counter[tuple[int, bool]]()
-        self._changing = set[tuple[int, bool]]()
+        self._heard: dict[tuple[int, bool], tuple[bytes, int, bool]] = {}  # latest, how many, changes
 
     def accepts(self, message: can.Message) -> bool:
         """Keep a frame; whether it is one for a CANopen network."""
         if message.is_rx and not message.is_remote_frame:
             key, data = (message.arbitration_id, message.is_extended_id), bytes(message.data)
             with self._lock:
-                if key in self._latest or len(self._latest) < MAX_IDENTIFIERS:
-                    self._changing |= {key} if self._latest.get(key, data) != data else set()
-                    self._latest[key] = data
-                    self._counts[key] += 1
+                if key in self._heard or len(self._heard) < MAX_IDENTIFIERS:
+                    before, count, changes = self._heard.get(key, (data, 0, False))
+                    self._heard[key] = data, count + 1, changes or data != before
         return is_canopen(message)
 
     def counted(self, seconds: float) -> tuple[FoundFrame, ...]:
         """The frames that were heard until now, in ``seconds``, by identifier."""
         with self._lock:
             return tuple(
-                FoundFrame(*key, len(data), self._counts[key] / seconds, key in self._changing)
-                for key, data in sorted(self._latest.items())
+                FoundFrame(*key, len(data), count / seconds, changes)
+                for key, (data, count, changes) in sorted(self._heard.items())
             )
 
 

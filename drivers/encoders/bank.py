@@ -4,7 +4,7 @@ import logging
 import threading
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -49,10 +49,11 @@ class BankSession(ABC):
     """An open bus; used by one thread. A subclass connects at its creation.
 
     ``identities`` are those of the encoders of legs 1 to 6, after :meth:`start`; ``subjects`` those of
-    messages about these.
+    messages about these. ``close`` closes the bus, even if it has failed.
     """
 
     identities: tuple[DeviceIdentity, ...]
+    close: Callable[[], None]
 
     def __init__(self, settings: EncoderSettings, subjects: Sequence[str]) -> None:
         self.subjects = subjects
@@ -66,10 +67,6 @@ class BankSession(ABC):
     @abstractmethod
     def _sample(self) -> tuple[int, ...]:
         """The counts of legs 1 to 6, of one instant."""
-
-    @abstractmethod
-    def close(self) -> None:
-        """Close the bus, even if it has failed."""
 
     def read(self) -> EncoderSample:
         """One complete sample.

@@ -34,6 +34,10 @@ class Leg:
         """The subject of messages about this encoder."""
         return subject_of([self])
 
+    def error(self, problem: str, action: str) -> DeviceError:
+        """The error for what this encoder does, without a reaction of its own."""
+        return DeviceError(problem, subject=self.subject, action=action)
+
 
 def subject_of(legs: Sequence[Leg]) -> str:
     """The subject of messages about one or more encoders."""
@@ -60,11 +64,7 @@ class EncoderNode:
     def read(self, entry: ObjectEntry) -> int:
         """The value of a mandatory entry."""
         if (value := self.read_optional(entry)) is None:
-            raise DeviceError(
-                f"has no {entry}",
-                subject=self.leg.subject,
-                action="Check that it is a CANopen encoder (CiA 406)",
-            )
+            raise self.leg.error(f"has no {entry}", "Check that it is a CANopen encoder (CiA 406)")
         return value
 
     def read_optional(self, entry: ObjectEntry) -> int | None:
@@ -81,10 +81,9 @@ class EncoderNode:
         except SdoAbortedError as error:
             if error.code in ABSENT:
                 return None
-            raise DeviceError(
+            raise self.leg.error(
                 f"refuses {TIMES_ASKED} times to read {entry}: {error}",
-                subject=self.leg.subject,
-                action="Switch it off and on, then open the encoders again; if it stays so, look the code "
+                "Switch it off and on, then open the encoders again; if it stays so, look the code "
                 "up in its manual",
             ) from error
 
@@ -119,26 +118,22 @@ class EncoderNode:
         self.check_alone()
         if not self.sdo.latest:
             return silent_nodes(f"does not respond for {entry}: {error}", [self.leg])
-        return DeviceError(
+        return self.leg.error(
             f"does not respond as it should for {entry}, but {self.sdo.latest.hex(' ')}: {error}",
-            subject=self.leg.subject,
-            action="End other programs that ask it, then open the encoders again, or use another device",
+            "End other programs that ask it, then open the encoders again, or use another device",
         )
 
 
 def setting_refused(what: str, leg: Leg) -> DeviceError:
     """The error for a device that does not take a setting needed for one sample per SYNC."""
-    return DeviceError(
-        what, subject=leg.subject, action="Set it with the vendor's tool, or use another device"
-    )
+    return leg.error(what, "Set it with the vendor's tool, or use another device")
 
 
 def duplicated_node(what: str, leg: Leg) -> DeviceError:
     """The error for a node id that two devices share."""
-    return DeviceError(
+    return leg.error(
         f"{what}: two devices share node id {leg.node}, another program uses this bus, or it answers late",
-        subject=leg.subject,
-        action="Unplug one, give it another node id, or raise timeout_s, then open the encoders again",
+        "Unplug one, give it another node id, or raise timeout_s, then open the encoders again",
     )
 
 

@@ -33,10 +33,7 @@ class EncoderSession(BankSession):
             None if settings.eds is None else node_identity.read_data_sheet(Path(settings.eds))
         )
         self.bus = EncoderBus(bus_settings(settings), closing, trace)
-
-    def close(self) -> None:
-        """Close the bus."""
-        self.bus.close()
+        self.close = self.bus.close
 
     def _sample(self) -> tuple[int, ...]:
         """The counts of one SYNC; valid only if no fault is found after it."""

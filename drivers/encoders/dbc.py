@@ -11,6 +11,7 @@ import time
 from codecs import BOM_UTF8
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -94,31 +95,29 @@ def _signal(
     unit: JointUnit,
     step: float,
 ) -> PositionSignal:
+    refused = partial(FileError, subject=settings.file)
     message_name, _, signal_name = name.partition(".")
     message = _named(found.messages, message_name, "message", settings)
     signal = _named(message.signals, signal_name, "signal", settings)
     try:
         message.refresh(strict=True)
     except _cantools().Error as error:
-        raise FileError(
+        raise refused(
             f"contradicts itself: {str(error).rstrip('.')}",
-            subject=settings.file,
             action="Correct the signals there: the position would be read from bits of another",
         ) from error
     for needed in settings.must_be:
         _named(message.signals, needed, "signal", settings)
     scales = SCALES[unit]
     if signal.unit not in scales:
-        raise FileError(
+        raise refused(
             f"signal {name} is in {signal.unit or 'no unit'}, where joints are in {unit}",
-            subject=settings.file,
             action=f"Give it one of the units {', '.join(scales)}",
         )
     scale = scales[signal.unit]
     if not signal.is_float and step > COARSER * abs(signal.scale * scale):
-        raise FileError(
+        raise refused(
             f"signal {name} has finer steps ({abs(signal.scale * scale):g} {unit}) than a count ({step:g})",
-            subject=settings.file,
             action="Correct measuring_step_nm or counts_per_turn in the cell file",
         )
     frame = FrameId(message.frame_id, bool(message.is_extended_frame))
@@ -175,16 +174,13 @@ class DbcSession(BankSession):
             for one in self._signals
         )
         self._bus = EncoderBus(bus_settings(settings), closing, trace, self._accepts)
+        self.close = self._bus.close
 
     def start(self) -> None:
         """Listen to all six, and take a first sample."""
         for frame in self._frames:
             self._bus.network.subscribe(frame.number, self._receiver(frame))
         self._sample()
-
-    def close(self) -> None:
-        """Close the bus."""
-        self._bus.close()
 
     def _accepts(self, message: can.Message) -> bool:
         frame = FrameId(message.arbitration_id, message.is_extended_id)

@@ -67,11 +67,10 @@ def counts_in(
     found = {}
     for leg in span.legs:
         start = REGISTER_BYTES * (described.registers[leg - 1] - span.first)
-        places = range(start, start + described.bits // 8, REGISTER_BYTES)
-        registers = [data[place : place + REGISTER_BYTES] for place in places]
+        own = data[start : start + described.bits // 8]
         if described.word_order == "little":
-            registers.reverse()
-        found[leg] = int.from_bytes(b"".join(registers), signed=signed)
+            own = own[REGISTER_BYTES:] + own[:REGISTER_BYTES]
+        found[leg] = int.from_bytes(own, signed=signed)
     return found
 
 
@@ -99,11 +98,8 @@ class ModbusSession(BankSession):
         line = {**LINE, **described.serial, "settle_s": described.settle_s}
         self._port = ModbusPort(self._url, line, closing, trace)
         self._port.subject = "encoders"
+        self.close = self._port.close
         self._answering, self._has_sampled = set[int](), False
-
-    def close(self) -> None:
-        """Close the line."""
-        self._port.close()
 
     def start(self) -> None:
         """Open the line, and read; some devices refuse a request with registers that they do not have."""

@@ -19,7 +19,7 @@ from drivers.encoders.object_dictionary import DeviceType, ObjectEntry
 from drivers.errors import BusError
 from drivers.interfaces import DeviceIdentity
 from hexacell.cell.devices import EncoderSettings, LinearEncoderSettings, RotaryEncoderSettings
-from hexacell.errors import DeviceError, FileError
+from hexacell.errors import FileError
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.storage.atomic_files import read_bytes
 
@@ -72,10 +72,9 @@ def read_device_type(node: EncoderNode, unit: JointUnit = JointUnit.MM) -> Devic
         if profile == od.ENCODER_PROFILE:
             classes = " and ".join(str(one >> 16) for one in DeviceType if one.unit is unit)
             what = f"an encoder, but of class {kind}; {wanted} ones are {classes}"
-        raise DeviceError(
+        raise node.leg.error(
             f"is no absolute {wanted} encoder: its device type is 0x{value:08X} ({what})",
-            subject=node.leg.subject,
-            action="Check `nodes` under [encoders] in the cell file against the devices' node ids",
+            "Check `nodes` under [encoders] in the cell file against the devices' node ids",
         )
     return DeviceType(value)
 
@@ -95,10 +94,9 @@ def check_step(node: EncoderNode, settings: EncoderSettings) -> None:
     else:
         return
     if not is_right:
-        raise DeviceError(
+        raise node.leg.error(
             f"has {has}, the cell file says {stated}",
-            subject=node.leg.subject,
-            action=f"Correct `{key}` under [encoders], or set the device with its vendor's tool",
+            f"Correct `{key}` under [encoders], or set the device with its vendor's tool",
         )
 
 
@@ -110,11 +108,10 @@ def _measuring_step(node: EncoderNode, stated: str) -> int:
     if setting is None:
         return node.read(od.MEASURING_STEP)
     if step is not None and step != setting:
-        raise DeviceError(
+        raise node.leg.error(
             f"has two measuring steps: {setting} nm in {od.MEASURING_STEP_SETTING}, {step} nm in "
             f"{od.MEASURING_STEP}",
-            subject=node.leg.subject,
-            action="Move the joint by a known length to see which holds, and name it: "
+            "Move the joint by a known length to see which holds, and name it: "
             '`step_object = "6005h"` or "6501h" under [encoders]',
         )
     return setting
@@ -160,10 +157,9 @@ def check_serial_number(node: EncoderNode, identity: DeviceIdentity, settings: E
         return
     expected = str(settings.serial_numbers[node.leg.number - 1])
     if identity.serial_number != expected:
-        raise DeviceError(
+        raise node.leg.error(
             f"has serial number {identity.serial_number or '(none)'}, the cell file says {expected}",
-            subject=node.leg.subject,
-            action="If it was exchanged on purpose, correct `serial_numbers` under [encoders] and "
+            "If it was exchanged on purpose, correct `serial_numbers` under [encoders] and "
             "calibrate; if not, check which cable goes to which leg",
         )
 
@@ -197,11 +193,10 @@ class DataSheet:
             found, stated = node.read_optional(entry), self.values.get(entry)
             if stated is not None and found != stated:
                 has = "none" if found is None else f"0x{found:X}"
-                raise DeviceError(
+                raise node.leg.error(
                     f"is not the device of {self.path.name}: its {name} is {has}, "
                     f"the file says 0x{stated:X}",
-                    subject=node.leg.subject,
-                    action="Name the EDS file of this device under [encoders], or check what was mounted",
+                    "Name the EDS file of this device under [encoders], or check what was mounted",
                 )
         differences = []
         for name, entry in HOW_IT_IS_SET.items():

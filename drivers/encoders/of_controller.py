@@ -16,11 +16,9 @@ from typing import Protocol, runtime_checkable
 from drivers.encoders.bank import joint_variables
 from drivers.errors import NotHomedError
 from drivers.interfaces import DeviceIdentity, EncoderSample
-from hexacell.cell.devices import EncoderSettings
+from hexacell.cell.devices import OF_CONTROLLER, EncoderSettings
 from hexacell.errors import UsageError
 from hexacell.kinematics.parameters import LEGS
-
-PROTOCOL = "controller"
 
 Zeros = Callable[[], Sequence[float]]
 """By how much the joints that a controller reports exceed what its encoders show; raises ``FileError``."""
@@ -55,7 +53,7 @@ class ControllerScales:
     async def open(self) -> tuple[DeviceIdentity, ...]:
         """One identity a leg; nothing is asked."""
         return tuple(
-            DeviceIdentity(f"encoder of leg {leg}", PROTOCOL, "as the controller reports its joints")
+            DeviceIdentity(f"encoder of leg {leg}", OF_CONTROLLER, "as the controller reports its joints")
             for leg in range(1, LEGS + 1)
         )
 

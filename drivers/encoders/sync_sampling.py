@@ -13,7 +13,6 @@ from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode, Leg, duplicated_node, setting_refused, silent_nodes
 from drivers.encoders.object_dictionary import DeviceType, ObjectEntry
 from drivers.errors import BusError
-from hexacell.errors import DeviceError
 
 SYNC = 0x080
 MAX_SYNCS = 3
@@ -204,10 +203,9 @@ class SyncSampler:
         counts = tuple(count for count in self._counts if count is not None)
         if len(counts) < len(self._counts):
             index = self._counts.index(None)
-            raise DeviceError(
+            raise self.legs[index].error(
                 f"sent {self._lengths[index]} bytes where its position needs {self.channels[index].length}",
-                subject=self.legs[index].subject,
-                action="Open the encoders again; if it stays so, use another device",
+                "Open the encoders again; if it stays so, use another device",
             )
         return counts
 

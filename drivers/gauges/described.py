@@ -7,7 +7,6 @@ distinguishes several gauges on one port; ``modbus`` says in which registers a v
 
 import re
 import struct
-from typing import ClassVar
 
 from drivers.errors import WrongAnswer
 from drivers.gauges.protocol import (
@@ -32,15 +31,8 @@ class _DescribedGauge(SerialGauge):
     """A dial indicator, or what stands in its place, whose frames are ``frame`` of the cell file."""
 
     probe = None
-    protocol: ClassVar[str]
-    vendors: ClassVar[str]
     frame: DescribedFrame
     answer_check = "answer, protocol"
-
-    @property
-    def spec(self) -> ProtocolSpec:  # type: ignore[override]
-        """The protocol, with the example in the cell file."""
-        return ProtocolSpec(self.protocol, self.vendors, LineSettings(9600), self.frame.example)
 
     def _parse_value(self, frame: bytes) -> DisplayedValue:
         text = frame.strip(LINE_ENDS).decode("latin-1")
@@ -68,7 +60,6 @@ class _DescribedGauge(SerialGauge):
 class RequestGauge(_DescribedGauge, ValueOnlyGauge):
     """A gauge by request and answer."""
 
-    protocol, vendors = "request", "gauge by request"
     silence_check = "ask with its line end"
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
@@ -76,6 +67,7 @@ class RequestGauge(_DescribedGauge, ValueOnlyGauge):
         example = "request = { ask = ..., answer = ..., example = ... }"
         request = self._described(settings.request, "does not say what is asked and answered", example)
         self.frame = request
+        self.spec = ProtocolSpec("request", "gauge by request", LineSettings(9600), request.example)  # type: ignore[misc]
         self.terminator = request.ends_with.encode("latin-1")
         self.value_request = request.ask.encode("latin-1")
 
@@ -83,13 +75,12 @@ class RequestGauge(_DescribedGauge, ValueOnlyGauge):
 class StreamGauge(_DescribedGauge, StreamingGauge):
     """A gauge that sends unasked."""
 
-    protocol, vendors = "stream", "gauge that sends"
-
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
         super().__init__(settings, ports)
         example = "stream = { answer = ..., example = ... }"
         stream = self._described(settings.stream, "does not say what it sends", example)
         self.frame = self._stream = stream
+        self.spec = ProtocolSpec("stream", "gauge that sends", LineSettings(9600), stream.example)  # type: ignore[misc]
         self.channel = settings.channel if stream.has_channel else None
 
     def _line_settings(self) -> dict[str, object]:
@@ -128,9 +119,8 @@ class ModbusGauge(ValueOnlyGauge):
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
         super().__init__(settings, ports)
-        self._modbus = self._described(
-            settings.modbus, "does not say in which register it is", "modbus = { register = ... }"
-        )
+        example = "modbus = { register = ... }"
+        self._modbus = self._described(settings.modbus, "does not say in which register it is", example)
         self._format = struct.Struct(FORMATS[self._modbus.type])
         self.channel = settings.place_on_line
         self.value_request = REQUEST.pack(
@@ -139,10 +129,9 @@ class ModbusGauge(ValueOnlyGauge):
             self._modbus.register_,
             self._format.size // WORD,
         )
-        resolution = settings.resolution_mm or 0.001
-        self._decimals = decimals_of(
-            resolution if self._modbus.type == "float32" else self._modbus.mm_per_unit
-        )
+        is_float = self._modbus.type == "float32"
+        last_digit = (settings.resolution_mm or 0.001) if is_float else self._modbus.mm_per_unit
+        self._decimals = decimals_of(last_digit)
 
     def _garbled(self, received: bytes) -> DeviceError:
         what, action = wrong_frame(received, self._modbus.device)
@@ -151,10 +140,8 @@ class ModbusGauge(ValueOnlyGauge):
     def _parse_value(self, frame: bytes) -> DisplayedValue:
         if len(frame) != self._format.size:
             raise FrameRejected(frame)
-        words = [frame[start : start + WORD] for start in range(0, len(frame), WORD)]
-        if self._modbus.word_order == "little":
-            words.reverse()
-        [number] = self._format.unpack(b"".join(words))
+        is_little = self._modbus.word_order == "little"
+        [number] = self._format.unpack(frame[WORD:] + frame[:WORD] if is_little else frame)
         if number in self._modbus.at_end:
             raise self._at_end(f"shows {number}, as at an end of its travel")
         text = f"{frame.hex(' ', WORD)} = {number:g}"

@@ -10,10 +10,11 @@ cannot be asked for.
 import asyncio
 import re
 from contextlib import suppress
+from dataclasses import replace
 
-from drivers.errors import EmptyChannel, GaugeAtEnd, GaugeSilent, WrongAnswer
+from drivers.errors import EmptyChannel, GaugeSilent, WrongAnswer
 from drivers.gauges import protocol
-from drivers.gauges.serial_gauge import SerialGauge
+from drivers.gauges.serial_gauge import ValueOnlyGauge
 from drivers.interfaces import GaugeReading
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
@@ -44,7 +45,7 @@ def parse_identification(frame: bytes) -> str:
     return match[1].decode("ascii").strip()
 
 
-class Mux10Gauge(SerialGauge):
+class Mux10Gauge(ValueOnlyGauge):
     """A dial indicator on one channel of a Mitutoyo MUX-10 or a multiplexer with its format."""
 
     spec = protocol.ProtocolSpec(
@@ -89,15 +90,9 @@ class Mux10Gauge(SerialGauge):
         raise self._at_end(f"shows an error instead of a value ({displayed}), as at an end of its travel")
 
     async def _read_state(self) -> protocol.GaugeState:
-        displayed: protocol.DisplayedValue | None = None
-        with suppress(GaugeAtEnd):
-            displayed = await self._read_value()
-        identification: str | None = None
+        state = await super()._read_state()
         if self._state is not None:
-            identification = self._state.identification
-        else:
-            with suppress(GaugeSilent, WrongAnswer):
-                identification = await self._query(b"V\r", parse_identification)
-        if displayed is None:
-            return protocol.GaugeState(identification)
-        return protocol.GaugeState(identification, displayed.unit, displayed.decimals)
+            return replace(state, identification=self._state.identification)
+        with suppress(GaugeSilent, WrongAnswer):
+            return replace(state, identification=await self._query(b"V\r", parse_identification))
+        return state

@@ -8,9 +8,6 @@ from enum import StrEnum
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError
 
-TERMINATOR = b"\r"
-"""Ends every request, and is the first line end of every answer."""
-
 
 @dataclass(frozen=True, slots=True)
 class LineSettings:

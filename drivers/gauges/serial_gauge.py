@@ -55,7 +55,7 @@ class SerialGauge(ABC):
     has_channels: ClassVar[bool] = False
     normal_modes: ClassVar[frozenset[str]] = frozenset()
     value_request: bytes
-    terminator: bytes = protocol.TERMINATOR
+    terminator: bytes = b"\r"
     verb: str = "answers"
     answer_check: str = "protocol"
     silence_check: str = "protocol"

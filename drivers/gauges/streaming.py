@@ -31,8 +31,7 @@ class Origin(Enum):
 class StreamingGauge(ValueOnlyGauge):
     """A gauge that nobody asks. Several may send on one line, each with its channel.
 
-    Attributes:
-        usual_delay_s: how long ago a value may have been measured when it comes, unless the cell file says.
+    A value may have been measured ``usual_delay_s`` before it comes, unless the cell file says how long.
     """
 
     value_request = terminator = b""
@@ -99,12 +98,9 @@ class StreamingGauge(ValueOnlyGauge):
                 "Correct baud rate in serial, or answer and ends_with of protocol stream, in the cell file",
             )
         if Origin.ANOTHER_GAUGE in heard:
-            return self._error(
-                EmptyChannel,
-                f"channel {self.channel} {waited}, others on port {self.settings.port} do",
-                "Switch its transmitter on, move its plunger off an end, or correct channel in the cell "
-                "file",
-            )
+            problem = f"channel {self.channel} {waited}, others on port {self.settings.port} do"
+            check = "Switch its transmitter on, move its plunger off an end, or correct channel"
+            return self._error(EmptyChannel, problem, f"{check} in the cell file")
         return self._error(
             GaugeSilent,
             f"{waited} on port {self.settings.port}{last}",

@@ -22,9 +22,6 @@ from drivers.wire_trace import TrafficDirection
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError
 
-EXTRA = "visa"
-PURE_PYTHON = "@py"
-MS = 1000.0
 SOCKET = re.compile(r"TCPIP\d*::(?P<host>[^:]+)::(?P<port>\d+)::SOCKET", re.IGNORECASE)
 SERIAL = re.compile(r"ASRL(?P<port>.+?)(?:::INSTR)?", re.IGNORECASE)
 IDENTIFY = b"*IDN?"
@@ -60,8 +57,8 @@ class VisaPort(RequestPort):
         """Open the resource unless it is open; how often it has been opened."""
         self.require_not_closed()
         if self._resource is None:
-            self._visa = optional("pyvisa", EXTRA, self.subject)
-            backend = str(self._settings.get("backend", PURE_PYTHON))
+            self._visa = optional("pyvisa", "visa", self.subject)
+            backend = str(self._settings.get("backend", "@py"))
             try:
                 self._resource = self._visa.ResourceManager(backend).open_resource(self.url)
             except Exception as error:  # its backends raise anything, also Exception itself
@@ -86,7 +83,7 @@ class VisaPort(RequestPort):
                 self._resource.clear()
                 self._must_clear = False
             self._record(TrafficDirection.SENT, request)
-            self._resource.timeout = MS * timeout_s  # of writing too
+            self._resource.timeout = 1000.0 * timeout_s  # ms, of writing too
             self._resource.write_raw(request)
             received = self._message()
         except (OSError, termios.error, self._visa.errors.Error) as error:

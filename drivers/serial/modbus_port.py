@@ -22,7 +22,6 @@ from drivers.wire_trace import TrafficDirection
 from hexacell.clock import Patience
 from hexacell.errors import DeviceError
 
-EXTRA = "modbus"
 REQUEST = struct.Struct(">BBHH")
 HOLDING, INPUT = 3, 4
 FUNCTIONS = {"holding": HOLDING, "input": INPUT}
@@ -94,8 +93,8 @@ class ModbusPort(RequestPort):
         self.require_not_closed()
         if self._client is None:
             line: dict[str, Any] = {one: self._settings[one] for one in LINE_KEYS if one in self._settings}
-            self._modbus = optional("pymodbus", EXTRA, self.subject)
-            client = optional("pymodbus.client", EXTRA, self.subject).ModbusSerialClient(
+            self._modbus = optional("pymodbus", "modbus", self.subject)
+            client = optional("pymodbus.client", "modbus", self.subject).ModbusSerialClient(
                 self.url, retries=0, trace_packet=self._note, **line
             )
             # Not by its own connect(), which gives no cause and configures a pseudo-terminal twice.
@@ -182,16 +181,12 @@ class ModbusPort(RequestPort):
             if not is_copies(surplus, self._frame):
                 self.surplus_count += 1
                 self._must_clear = True
-        if self._must_clear:
-            self._clear()
-
-    def _clear(self) -> None:
-        """Let late answers come and go: they look like those to the next request."""
-        self.closing.wait(self.worst_latency_s)
-        self.require_not_closed()
-        if self._client.socket is not None:
-            self._client.socket.reset_input_buffer()
-        self._must_clear = False
+        if self._must_clear:  # late answers come and go: they look like those to the next request
+            self.closing.wait(self.worst_latency_s)
+            self.require_not_closed()
+            if port is not None:
+                port.reset_input_buffer()
+            self._must_clear = False
 
     def _note(self, sending: bool, data: bytes) -> bytes:
         new = data if sending else data.removeprefix(self._received)  # all since the request comes

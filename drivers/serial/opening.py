@@ -10,7 +10,6 @@ import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -209,17 +208,6 @@ IFLAG = 0
 ODD_BITS = {"E": 0, "O": 1}
 
 
-class ParityCheck(StrEnum):
-    """Who checks the parity of received bytes: ``parity_check`` in a gauge's ``serial`` table.
-
-    ``SOFTWARE`` is for lines that pass eight bits on, of which the last is the parity: a network server
-    set to 8N2 has no terminal that could check it for a gauge with 7E2.
-    """
-
-    TERMINAL = "terminal"
-    SOFTWARE = "software"
-
-
 class ParityInBit7:
     """Parity, which pyserial sends but never checks, as the eighth bit of every byte: ``7E2`` is ``8N2``.
 
@@ -246,16 +234,18 @@ class ParityInBit7:
 def in_software(settings: dict[str, object]) -> ParityInBit7 | None:
     """Take the parity out of the settings of a line, if it is to be checked in software.
 
-    ``settings`` are those of pyserial and ``parity_check``, which is removed from them.
+    ``settings`` are those of pyserial and ``parity_check``, which is removed from them: ``terminal``, or
+    ``software`` for lines that pass eight bits on, of which the last is the parity. A network server set
+    to 8N2 has no terminal that could check it for a gauge with 7E2.
 
     Raises:
         FileError: ``parity_check`` is unknown, or the line has not seven bits with a parity.
     """
-    word = settings.pop("parity_check", ParityCheck.TERMINAL)
-    if word not in set(ParityCheck):
-        raise _refused(f"parity_check {word!r} is unknown", "Write 'terminal' or 'software'")
-    if word == ParityCheck.TERMINAL:
+    word = settings.pop("parity_check", "terminal")
+    if word == "terminal":
         return None
+    if word != "software":
+        raise _refused(f"parity_check {word!r} is unknown", "Write 'terminal' or 'software'")
     odd = ODD_BITS.get(str(settings.get("parity", "N")))
     if odd is None or settings.get("bytesize") != 7:
         raise _refused("parity_check 'software' wants 7 bits and a parity", "Write bytesize and parity too")

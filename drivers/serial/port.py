@@ -32,10 +32,8 @@ class SerialPort(request_port.RequestPort):
     next request waits until the line has been silent for ``worst_latency_s``. Bytes that come without
     a request are read and kept in ``unsolicited``, never taken for a response; copies of the last response
     are dropped. Once there were any, a response counts only if nothing else comes with it: a key pressed on
-    an instrument, or a multiplexer that sends twice, would put all later responses out of step.
-
-    Attributes:
-        log: the frames that came unasked, of a device that sends by itself.
+    an instrument, or a multiplexer that sends twice, would put all later responses out of step. ``log`` has
+    the frames that came unasked, of a device that sends by itself.
     """
 
     def __post_init__(self) -> None:

@@ -42,11 +42,9 @@ def is_copies(surplus: bytes, frame: bytes) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class StreamedFrame:
-    """A line of text without its end.
+    """A line of text without its end; ``number`` counts from 1.
 
-    Attributes:
-        number: of the frame, counted from 1.
-        began_after_s: its first byte came after this time, s of the port's clock.
+    Its first byte came after ``began_after_s``, s of the port's clock.
     """
 
     number: int
@@ -97,18 +95,14 @@ WORST_LATENCY_S = 2.0
 class NoAnswer(Exception):
     """No complete frame in time; ``received`` is what came, ``beside_echo`` without the request's echo.
 
-    Never shown to users.
+    ``is_echoed``: the request came back. Never shown to users.
     """
 
     def __init__(self, received: bytes, request: bytes) -> None:
         self.received = received
         self.beside_echo = received.replace(request, b"") if request else received
+        self.is_echoed = self.beside_echo != received
         super().__init__(received)
-
-    @property
-    def is_echoed(self) -> bool:
-        """Whether the request came back."""
-        return self.beside_echo != self.received
 
 
 @dataclass(eq=False)

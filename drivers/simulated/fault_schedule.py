@@ -35,7 +35,7 @@ class CellFaults:
         }
         of_controller: dict[FaultKind, Switch] = {
             "unplugged": controller.set_unplugged,
-            "silent": controller.set_silent,
+            "silent": setting(controller, "is_silent"),
             "forward kinematics": setting(machine, "fails_forward"),
             "old config": setting(machine, "keeps_geometry"),
             "ignored corrections": setting(machine, "ignores_corrections"),

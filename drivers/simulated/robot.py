@@ -33,20 +33,11 @@ def with_longer_legs(
     mechanism: Mechanism, controller: ControllerGeometry, poses: PoseBatch, joints: Array
 ) -> Array:
     """Joints (n, 6) for legs as long as play and compliance make them; ``joints`` are those without."""
-    corrections = controller.corrections
-    if not any((*corrections.play_mm, *corrections.compliance_um_n)):
-        return joints
-    sent, found = joints.copy(), np.flatnonzero(~np.isnan(joints).any(axis=1))
-    if found.size:
-        sent[found] = _under_load(mechanism, controller, poses[found], joints[found])
-    return sent
-
-
-def _under_load(
-    mechanism: Mechanism, controller: ControllerGeometry, poses: PoseBatch, joints: Array
-) -> Array:
-    """The joints (n, 6) at which the legs close with their lengths under load, at n poses within reach."""
     geometry, stated = controller.geometry, controller.corrections
+    reached = np.flatnonzero(~np.isnan(joints).any(axis=1))
+    if not (reached.size and any((*stated.play_mm, *stated.compliance_um_n))):
+        return joints
+    all_joints, poses, joints = joints.copy(), poses[reached], joints[reached]
     # On which side a leg lies does not depend on how heavy the platform is.
     newton = SimulatedLoad(
         weight_n=1.0, direction=stated.weight_direction, centre_mm=stated.weight_centre_mm
@@ -54,11 +45,11 @@ def _under_load(
     forces = leg_tensions(mechanism, geometry, poses, joints, newton)
     by_force = UM * np.array(stated.compliance_um_n) * stated.weight_n
     longer = 0.5 * np.array(stated.play_mm) * np.sign(forces) + by_force * forces
-    sent = joints
     for _ in range(ROUNDS):
-        excess = mechanism.residual_and_jacobian(geometry, poses, sent)[0] - longer
-        sent = sent - excess / mechanism.derivatives(geometry, poses, sent).joints
-    return sent
+        excess = mechanism.residual_and_jacobian(geometry, poses, joints)[0] - longer
+        joints = joints - excess / mechanism.derivatives(geometry, poses, joints).joints
+    all_joints[reached] = joints
+    return all_joints
 
 
 def directions_on(path: Array, before: Array) -> Array:

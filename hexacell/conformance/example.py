@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 
@@ -91,10 +90,6 @@ class MechanismExample:
         clear = np.flatnonzero(margins > LEAST_MARGIN)[:TURNS]
         assert len(clear) == TURNS, f"the drawing's robot reaches too few orientations at the point {point}"
         return poses[clear]
-
-    def labels(self) -> Iterator[tuple[int, int]]:
-        """Point and orientation of each pose, counted from 1."""
-        return product(range(1, len(self.points) + 1), range(1, TURNS + 1))
 
 
 def _change(parts: Array) -> FrameTransform:

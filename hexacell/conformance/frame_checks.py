@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from hexacell.conformance.example import MechanismExample
+from hexacell.conformance.example import TURNS, MechanismExample
 from hexacell.identification.diagnostics.frame_alignment import frame_derivatives
 from hexacell.identification.estimator import identify
 from hexacell.identification.placement import Placement
@@ -159,10 +159,10 @@ def records_without_noise(example: MechanismExample, truth: Geometry) -> Measure
         mechanism, normal, joints, start=commands, start_geometry=drawn, start_joints=joints
     )
     balls, zeros, records = actual.poses.positions @ frames.base, dict[int, Array](), []
-    for row, (point, orientation) in enumerate(example.labels()):
-        if actual.found[row]:
-            deviation = deviation_of(balls[row] - zeros.setdefault(point, balls[row]))
-            pose = example.poses.pose(row)
-            records.append(Record(point, orientation, pose, joints_of(joints[row]), deviation))
+    for row in np.flatnonzero(actual.found).tolist():
+        point, turn = divmod(row, TURNS)
+        deviation = deviation_of(balls[row] - zeros.setdefault(point, balls[row]))
+        pose = example.poses.pose(row)
+        records.append(Record(1 + point, 1 + turn, pose, joints_of(joints[row]), deviation))
     assert 2 * len(records) >= len(balls), "the robot cannot take most of the drawing's poses"
     return MeasurementSet(tuple(records))

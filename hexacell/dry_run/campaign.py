@@ -30,10 +30,8 @@ class VirtualCampaign:
     """One campaign, from the first reference to the end of the plan.
 
     The robot is placed at each pose; what is between is left to subclasses. Where the cell says so, the
-    controller commands with the estimate once the robot is known well enough.
-
-    Attributes:
-        outside: number of records at which the ball left the gauges' travel; they are not taken.
+    controller commands with the estimate once the robot is known well enough. ``outside`` is the number of
+    records at which the ball left the gauges' travel; they are not taken.
     """
 
     plan: Plan
@@ -252,11 +250,9 @@ MOST_QUICKLY_TRIED = 3
 
 @dataclass(frozen=True, slots=True)
 class QuickTrial:
-    """What the quick level gives.
+    """What the quick level gives; ``accuracy`` is None where no robot could be measured.
 
-    Attributes:
-        accuracy: None where no robot could be measured.
-        minutes: time to measure there, without held-out poses.
+    ``minutes`` is the time to measure there, without held-out poses.
     """
 
     accuracy: QuickAccuracy | None

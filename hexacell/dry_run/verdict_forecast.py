@@ -12,7 +12,7 @@ the largest error J d over the task poses and its U by draws, as in a run (``doc
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -67,19 +67,14 @@ class VerdictForecast:
         """Whether the limits are such that a good machine passes."""
         return self.probabilities[Verdict.PASS] >= WANTED
 
-    @classmethod
-    def mean(cls, each: "Sequence[VerdictForecast]") -> "VerdictForecast":
+    @staticmethod
+    def mean(each: "Sequence[VerdictForecast]") -> "VerdictForecast":
         """The mean over some robots; the limits and the parts are those of the worst of them."""
         worst = max(each, key=lambda one: one.passing.position_mm)
         degrees = max(one.passing.orientation_deg for one in each)
-        return cls(
-            {verdict: float(np.mean([one.probabilities[verdict] for one in each])) for verdict in Verdict},
-            worst.limits,
-            worst.passing.model_copy(update={"orientation_deg": degrees}),
-            worst.largest_part,
-            worst.largest_part_mm,
-            worst.standard_mm,
-        )
+        means = {kind: float(np.mean([one.probabilities[kind] for one in each])) for kind in Verdict}
+        passing = worst.passing.model_copy(update={"orientation_deg": degrees})
+        return replace(worst, probabilities=means, passing=passing)
 
 
 def forecast_verdicts(stated: Array, budget: UncertaintyBudget, limits: ErrorLimits) -> VerdictForecast:

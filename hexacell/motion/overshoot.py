@@ -23,9 +23,7 @@ BACKLASH_SIGMAS = 3.0
 def overshoot(least: float, backlash: float) -> float:
     """How far every joint stands short of its place, in its unit.
 
-    Args:
-        least: the shortest way that says from which side a joint arrived.
-        backlash: one standard deviation of what is stated of it.
+    ``least`` is as of ``least_way``, ``backlash`` one standard deviation of what is stated of it.
     """
     return SPARE * max(least, BACKLASH_SIGMAS * backlash)
 

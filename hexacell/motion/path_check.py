@@ -58,10 +58,6 @@ class CheckedLines:
     is_open: Mask
     is_clear: Mask
 
-    def traced(self, row: int) -> tuple[PoseBatch, Array]:
-        """The actual poses on one line after its start, and their joint variables (m, 6), mm."""
-        return self.actual[1:, [row]].in_shape(-1), self.joints[1:, row]
-
 
 @dataclass(frozen=True, eq=False)
 class LinesFrom:
@@ -109,16 +105,11 @@ class LinesFrom:
         self, geometry: Geometry, poses: PoseBatch, joints: Array, rows: NDArray[np.intp]
     ) -> Mask:
         """Which of some lines stay clear of the singularities of a geometry."""
-        arguments = (
-            self.belief.mechanism,
-            geometry,
-            poses[:, rows].in_shape(-1),
-            joints[:, rows].reshape(-1, 6),
-        )
-        shape = (len(joints), len(rows))
-        # A singularity between two samples shows as another assembly mode beyond it.
         least = MARGIN_SHARE * self.belief.limits.singularity_margin
-        keeps, mode = (found.reshape(shape) for found in margin_and_mode(*arguments, least))
+        at = poses[:, rows].in_shape(-1), joints[:, rows].reshape(-1, 6)
+        found = margin_and_mode(self.belief.mechanism, geometry, *at, least)
+        # A singularity between two samples shows as another assembly mode beyond it.
+        keeps, mode = (one.reshape(len(joints), len(rows)) for one in found)
         clear: Mask = np.all(keeps & (mode == mode[:1]), axis=0)
         return clear
 

@@ -42,11 +42,9 @@ rotations are large and the ball moves fastest."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Path:
-    """A path that keeps joint ranges, singularity margin and gauge travel.
+    """A path that keeps joint ranges, singularity margin and gauge travel, over commands as waypoints.
 
-    Attributes:
-        waypoints: commands between its ends.
-        poses: actual poses (m) of the estimated robot along it, and their ``joints`` (m, 6), mm.
+    ``poses`` are the actual ones (m) of the estimated robot along it, ``joints`` theirs (m, 6), mm.
     """
 
     waypoints: tuple[Pose, ...]
@@ -156,7 +154,8 @@ def _path(lines: CheckedLines, waypoints: tuple[PoseBatch, ...], row: int) -> Pa
     """One of the lines as a path, with one of n poses of each waypoint; None if it is not clear."""
     if not lines.is_clear[row]:
         return None
-    return Path(tuple(waypoint.pose(row) for waypoint in waypoints), *lines.traced(row))
+    commands = tuple(waypoint.pose(row) for waypoint in waypoints)
+    return Path(commands, lines.actual[1:, [row]].in_shape(-1), lines.joints[1:, row])
 
 
 def find_route(

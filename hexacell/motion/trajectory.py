@@ -197,19 +197,12 @@ def shortest_duration(joints: Array, points: Array, limits: SpeedLimits) -> floa
     return max(SHORTEST_S, slowest * (len(joints) - 1))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LineDurations:
-    """Durations of a controller's straight lines under one geometry."""
-
-    mechanism: Mechanism
-    geometry: Geometry
-    branch: Branch
-
-    def of(self, start: Pose, end: Pose, limits: SpeedLimits) -> float:
-        """The shortest duration, s, of the line from ``start`` to ``end``."""
-        line = interpolate_line(PoseBatch.of([start]), PoseBatch.of([end]), WAY_PIECES)
-        joints = self.mechanism.inverse(self.geometry, self.branch, line)
-        legs = self.mechanism.legs(self.geometry, line, joints)
-        return shortest_duration(
-            joints, np.concatenate([line.positions[:, None], legs.platform_joints], axis=1), limits
-        )
+def line_duration(
+    mechanism: Mechanism, geometry: Geometry, branch: Branch, start: Pose, end: Pose, limits: SpeedLimits
+) -> float:
+    """The shortest duration, s, of a controller's straight line from ``start`` to ``end``."""
+    line = interpolate_line(PoseBatch.of([start]), PoseBatch.of([end]), WAY_PIECES)
+    joints = mechanism.inverse(geometry, branch, line)
+    platform_joints = mechanism.legs(geometry, line, joints).platform_joints
+    edge = np.concatenate([line.positions[:, None], platform_joints], axis=1)
+    return shortest_duration(joints, edge, limits)

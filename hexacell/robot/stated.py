@@ -176,17 +176,11 @@ def stated_effects(
     effects.append(of(uncertainty.repeatability_key(unit), stops))
     effects.append(replace(beside, source=stated.sources.get(uncertainty.STOPS, "cell file")))
     if isinstance(stated, uncertainty.UncertaintySettings):
-        half_mm = 0.5 * (limits.joint_max - limits.joint_min)
+        half_mm, waves = 0.5 * (limits.joint_max - limits.joint_min), effect_kinds.rail_waves
         effects += [
             of("rail_direction_mrad", effect_kinds.rail_directions),
-            of(
-                "rail_wave_short_um",
-                partial(effect_kinds.rail_waves, wavelength_mm=stated.rail_wave_short_mm),
-            ),
-            of(
-                "rail_wave_long_um",
-                partial(effect_kinds.rail_waves, wavelength_mm=stated.rail_wave_long_mm),
-            ),
+            of("rail_wave_short_um", partial(waves, wavelength_mm=stated.rail_wave_short_mm)),
+            of("rail_wave_long_um", partial(waves, wavelength_mm=stated.rail_wave_long_mm)),
             of("rail_sag_um", partial(effect_kinds.common_sag, half_length_mm=half_mm)),
         ]
     expansion = {
@@ -195,9 +189,8 @@ def stated_effects(
         MachinePart.LEGS: stated.expansion_legs_um_m_k,
     }
     acting = {part: 0.0 if part in known else by_kelvin for part, by_kelvin in expansion.items()}
-    measuring = of(
-        "temperature_measuring_k", partial(effect_kinds.temperature_while_measuring, um_per_m_k=acting)
-    )
+    warming = partial(effect_kinds.temperature_while_measuring, um_per_m_k=acting)
+    measuring = of("temperature_measuring_k", warming)
     if measured_range_k is not None:
         measuring = replace(measuring, size=measured_range_k, source="thermometers")
     legs: list[Effect] = []
@@ -210,6 +203,7 @@ def stated_effects(
         ]
     scales = effect_kinds.gauge_scales(1e3 * settings.noise.gauge_scale, is_estimated=True)
     yields = stated.leg_compliance_um_n
+    sagging = partial(effect_kinds.own_weight, um_per_n=yields, weight=_stated_weight(settings))
     return (
         *effects,
         replace(scales, source="noise.gauge_scale"),
@@ -219,10 +213,7 @@ def stated_effects(
         measuring,
         *legs,
         of("load_n", partial(effect_kinds.load_at_work, um_per_n=yields)),
-        of(
-            "own_weight_n",
-            partial(effect_kinds.own_weight, um_per_n=yields, weight=_stated_weight(settings)),
-        ),
+        of("own_weight_n", sagging),
     )
 
 

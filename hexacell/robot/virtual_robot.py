@@ -42,7 +42,6 @@ class VirtualRobot:
         stops: one standard deviation of where a joint stops beside its command, as its encoder shows it, in
             its unit; None for what the model's noise states.
         unseen: likewise beside what its encoder shows.
-        smallest_margin: the smallest singularity margin of the true geometry along all moves so far.
     """
 
     model: Robot
@@ -50,7 +49,6 @@ class VirtualRobot:
     random: np.random.Generator = field(default_factory=np.random.default_rng)
     stops: float | None = None
     unseen: float = 0.0
-    smallest_margin: float = np.inf
     _command: Pose | None = None
     _actual: PoseBatch | None = None
     _shown: Array = field(default_factory=lambda: np.full((1, 6), np.nan))
@@ -87,7 +85,8 @@ class VirtualRobot:
             ReachError: it cannot take the command clear of singularities.
         """
         actual = self.actual_poses(self.model.from_commands([command]))
-        if not actual.found[0] or self._see_margin(actual.poses, actual.joints) < self._least_margin:
+        at = self.model.mechanism, self.truth, actual.poses, actual.joints
+        if not actual.found[0] or singularity_margin(*at)[0] < self._least_margin:
             raise ReachError(f"this robot cannot reach {command}")
         here = actual.joints if self._joints_commanded is None else self._joints_commanded
         self._stop(command, np.concatenate([here, actual.joints]), actual.poses)
@@ -106,9 +105,7 @@ class VirtualRobot:
         traced, found = trace_path(self.model.mechanism, self.truth, *way)
         if not found[0]:
             raise LimitError("a singularity is on the line")
-        poses = traced.in_shape(-1)
-        self._see_margin(poses, joints)
-        self._stop(command, joints, poses[[-1]])
+        self._stop(command, joints, traced.in_shape(-1))
 
     def load(self, model: Robot) -> None:
         """Have the controller command with another geometry, that of ``model``; the joints stay.
@@ -161,16 +158,16 @@ class VirtualRobot:
         return inverse_kinematics(model.mechanism, model.commanding, model.branch, commands)
 
     def _stop(self, command: Pose, way: Array, poses: PoseBatch) -> None:
-        """Stop at a command at the end of a way of the joints (k, 6), or beside it where they scatter.
+        """Stop at the end of a way, joints (k, 6) and poses, or beside it where joints scatter.
 
         Raises:
             ReachError: no pose belongs to where the joints stopped.
         """
-        model, joints = self.model, way[[-1]]
+        model, joints, pose = self.model, way[[-1]], poses[[-1]]
         stops = model.noise.stops if self.stops is None else self.stops
         least = least_way(model.mechanism.words.joint_unit, stops)
         self._directions = arrival_directions(way, self._directions, least)
-        self._command, self._actual, self._shown = command, poses, joints
+        self._command, self._actual, self._shown = command, pose, joints
         self._joints_commanded = joints
         if not (stops or self.unseen):
             return
@@ -180,19 +177,13 @@ class VirtualRobot:
             model.mechanism,
             self.truth,
             self._shown + self.unseen * scatter[1],
-            start=poses,
+            start=pose,
             start_geometry=self.truth,
             start_joints=joints,
         )
         if not found.found[0]:
             raise ReachError(f"this robot cannot reach {command}")
         self._actual = found.poses
-
-    def _see_margin(self, poses: PoseBatch, joints: Array) -> float:
-        """The smallest singularity margin at some poses."""
-        margin = float(singularity_margin(self.model.mechanism, self.truth, poses, joints).min())
-        self.smallest_margin = min(self.smallest_margin, margin)
-        return margin
 
     @property
     def _commanded(self) -> PoseBatch:

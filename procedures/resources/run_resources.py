@@ -19,7 +19,7 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import Directions, deviation_of, joints_of
 from hexacell.motion.arrival import arrival_directions, least_way
-from hexacell.motion.trajectory import LineDurations, interpolate_line
+from hexacell.motion.trajectory import interpolate_line, line_duration
 from hexacell.noise.allowances import ReferenceChange
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.calibration import Calibration
@@ -141,9 +141,9 @@ class RunResources:
     async def move(self, way: Sequence[Pose], watched: WatchedSet, *, at_gauges: bool) -> None:
         """Move from pose to pose under guards, as fast as allowed with or without gauges at the ball."""
         commanding = self.current_config.geometry()
-        lines = LineDurations(self.settings.mechanism, commanding.geometry, commanding.branch)
+        robot = self.settings.mechanism, commanding.geometry, commanding.branch
         limits = speed_limits(self.settings.speed, at_gauges=at_gauges)
-        moves = [(end, lines.of(start, end, limits)) for start, end in pairwise(way)]
+        moves = [(end, line_duration(*robot, start, end, limits)) for start, end in pairwise(way)]
 
         def commanded() -> Array:
             now, mechanism = self.current_config.geometry(), self.calibration.robot.mechanism

@@ -143,6 +143,7 @@ def outcome(number: int, case: Case) -> Outcome:
     watched = watch(campaign, random)
     try:
         campaign.carry_out()
+        margin = watched.seen.margin
         found = identify(campaign.robot.problem(campaign.measurements))
         sigma = task_sigma(cell, robot, found)
         held_out = visit_held_out(cell, robot, found, truth, watched.seen, number)
@@ -154,7 +155,6 @@ def outcome(number: int, case: Case) -> Outcome:
         return Outcome(number, watched.seen, campaign.outside, reason=str(error))
     stands = stands_at(robot, truth, cell.settings.identification.points)
     largest = found.geometry.largest_difference(truth) if stands else np.nan
-    margin = watched.smallest_margin
     return Outcome(number, watched.seen, campaign.outside, held_out, sigma, largest, margin)
 
 

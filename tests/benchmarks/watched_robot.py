@@ -7,6 +7,8 @@ import numpy as np
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.rotations import Array
+from hexacell.kinematics.sensitivity import singularity_margin
 from hexacell.motion.trajectory import interpolate_line
 from hexacell.robot.model import Robot
 from hexacell.robot.virtual_robot import VirtualRobot
@@ -20,7 +22,7 @@ class Seen:
     """The worst at all ends of moves: of commands, and of the real robot. Angles in deg.
 
     ``way_is_kept`` is whether a stop on a way between two ends that keep tilt, turn, axes and joints would
-    keep them too.
+    keep them too. ``margin`` is the smallest singularity margin of the real robot along all moves.
     """
 
     moves: int = 0
@@ -31,6 +33,7 @@ class Seen:
     way_is_kept: bool = True
     spare: float = np.inf
     distance_mm: float = np.inf
+    margin: float = np.inf
 
 
 class WatchedRobot(VirtualRobot):
@@ -51,6 +54,11 @@ class WatchedRobot(VirtualRobot):
         super().move(command)
         self._note()
         self._note_way(PoseBatch.of([start]), PoseBatch.of([command]))
+
+    def _stop(self, command: Pose, way: Array, poses: PoseBatch) -> None:
+        margins = singularity_margin(self.model.mechanism, self.truth, poses, way[-len(poses) :])
+        self.seen.margin = min(self.seen.margin, float(margins.min()))
+        super()._stop(command, way, poses)
 
     def _note_way(self, start: PoseBatch, end: PoseBatch) -> None:
         line = self.model.frames.poses(interpolate_line(start, end, PIECES))

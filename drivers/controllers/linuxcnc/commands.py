@@ -145,14 +145,17 @@ class ControllerCommands:
         try:
             return parse_positions(text)
         except ValueError as error:
-            raise DeviceError(str(error), subject=self.subject) from error
+            raise self.error(str(error)) from error
+
+    def error(self, problem: str, action: str | None = None) -> DeviceError:
+        """The error for what the controller does, without a reaction of its own."""
+        return self.connection.error(DeviceError, problem, action)
 
 
 class CommandChannel:
     """A connection that is opened when it is needed, and replaced after it broke.
 
-    Attributes:
-        commands: the current connection, if there is one.
+    ``commands`` is the current one, if there is one.
     """
 
     def __init__(self, connect: Callable[[], Awaitable[ControllerCommands]]) -> None:

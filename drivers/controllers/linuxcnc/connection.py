@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, ExitStack, asynccontextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
-from typing import Self
+from typing import Self, TypeVar
 
 from drivers.controllers.linuxcnc import protocol
 from drivers.errors import ConnectionLost, ResponseTimeout
@@ -18,6 +18,8 @@ from hexacell.cell.robot import ControllerSettings
 from hexacell.clock import Patience
 from hexacell.errors import DeviceError
 from hexacell.storage.atomic_files import SHORTAGES
+
+ErrorT = TypeVar("ErrorT", bound=DeviceError)
 
 _log = logging.getLogger("drivers.controllers.linuxcnc")
 
@@ -163,17 +165,18 @@ class Connection:
         password = self.settings.enable_password.get_secret_value()
         answer = await self.request(f"set enable {password}", timeout_s)
         if not answer.accepted:
-            raise DeviceError(
-                "refuses the enable password",
-                subject=self.subject,
-                action="Set enable_password in the password_file to linuxcncrsh's own (--enablepw)",
-            )
+            action = "Set enable_password in the password_file to linuxcncrsh's own (--enablepw)"
+            raise self.error(DeviceError, "refuses the enable password", action)
 
     async def close(self) -> None:
         """Close the connection; closing twice is harmless."""
         self.writer.transport.abort()
         with suppress(OSError):
             await self.writer.wait_closed()
+
+    def error(self, kind: type[ErrorT], problem: str, action: str | None = None) -> ErrorT:
+        """The error for what this controller does."""
+        return kind(problem, subject=self.subject, action=action)
 
     async def _greet(self) -> None:
         password = self.settings.connect_password.get_secret_value()
@@ -185,20 +188,15 @@ class Connection:
         except TimeoutError:
             if self._buffer.rest:
                 raise self._not_linuxcncrsh(self._buffer.rest) from None
-            raise ResponseTimeout(
-                "is frozen: it accepts the connection but does not respond",
-                subject=self.subject,
-                action="Check that linuxcncrsh listens there, and restart LinuxCNC",
-            ) from None
+            problem = "is frozen: it accepts the connection but does not respond"
+            action = "Check that linuxcncrsh listens there, and restart LinuxCNC"
+            raise self.error(ResponseTimeout, problem, action) from None
         match line.split():
             case ["HELLO", "ACK", *server]:
                 self.server = " ".join(server)
             case ["HELLO", "NAK"]:
-                raise DeviceError(
-                    "refuses the connect password",
-                    subject=self.subject,
-                    action="Set connect_password in the password_file to linuxcncrsh's own (--connectpw)",
-                )
+                action = "Set connect_password in the password_file to linuxcncrsh's own (--connectpw)"
+                raise self.error(DeviceError, "refuses the connect password", action)
             case _:
                 raise self._not_linuxcncrsh(line)
         await self._write(protocol.encode_command("set echo off", self.subject))
@@ -207,11 +205,8 @@ class Connection:
         await self.request("set verbose on")
 
     def _not_linuxcncrsh(self, said: str) -> DeviceError:
-        return DeviceError(
-            f"is no linuxcncrsh, it says {said[:_SHOWN]!r}",
-            subject=self.subject,
-            action="Check controller.host and controller.port",
-        )
+        action = "Check controller.host and controller.port"
+        return self.error(DeviceError, f"is no linuxcncrsh, it says {said[:_SHOWN]!r}", action)
 
     async def _write(self, line: bytes) -> None:
         self._record(TrafficDirection.SENT, line)
@@ -235,11 +230,8 @@ class Connection:
                 return protocol.Response(accepted=False, explanations=tuple(remarks))
             asked = " ".join(command.split()[:2])  # no passwords in messages
             _log.warning("%s: no answer to '%s' within %g s", self.subject, asked, timeout_s)
-            raise ResponseTimeout(
-                f"is frozen: it is connected, but did not answer '{asked}' within {timeout_s:g} s",
-                subject=self.subject,
-                action="Restart LinuxCNC, and find out why",
-            ) from None
+            problem = f"is frozen: it is connected, but did not answer '{asked}' within {timeout_s:g} s"
+            raise self.error(ResponseTimeout, problem, "Restart LinuxCNC, and find out why") from None
         self._outstanding = None
         return protocol.Response(answer.accepted, answer.text, tuple(remarks))
 
@@ -267,7 +259,7 @@ class Connection:
         if not self.server:  # it counts those that have left as well
             what = "it was ended, or takes no more clients than the --sessions that it was started with"
             action = "Restart LinuxCNC, with linuxcncrsh without --sessions"
-        return ConnectionLost(f"closed the connection: {what}", subject=self.subject, action=action)
+        return self.error(ConnectionLost, f"closed the connection: {what}", action)
 
     def _record(self, direction: TrafficDirection, data: bytes) -> None:
         if self._wire.is_on:

@@ -30,7 +30,6 @@ _UNREACHABLE = re.compile(
     r"would exceed (?:joint \d+'s|limits)|fails kinematicsInverse|gave non-finite joint location",
     re.IGNORECASE,
 )
-_SECONDS_A_MINUTE = 60.0
 
 
 def subject_of(settings: ControllerSettings) -> str:
@@ -128,7 +127,7 @@ def timed_move(pose: Pose, duration_s: float) -> str:
         raise ValueError("a coordinate is not a finite number")
     words = zip("XYZABC", pose.as_tuple(), strict=True)
     coordinates = " ".join(f"{axis}{value:.{_DECIMALS}f}" for axis, value in words)
-    return f"G21 G53 G93 G1 {coordinates} F{_SECONDS_A_MINUTE / duration_s:.{_DECIMALS}f}"
+    return f"G21 G53 G93 G1 {coordinates} F{60.0 / duration_s:.{_DECIMALS}f}"
 
 
 def restoring_block(codes: str) -> str:

@@ -23,6 +23,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, nullcontext, suppress
 from dataclasses import replace
 from enum import Enum, auto
+from functools import partial
 
 from drivers.controllers.linuxcnc import startup
 from drivers.controllers.linuxcnc.commands import CommandChannel, ControllerCommands, ErrorMessages
@@ -72,8 +73,8 @@ class Session:
         self._timeouts = timeouts
         self._trace = trace
         self._state = SessionState.CLOSED
-        self._channel = CommandChannel(self._connect)
-        self._querying = CommandChannel(self._connect_for_status)
+        self._channel = CommandChannel(partial(self._connect, commanding=True))
+        self._querying = CommandChannel(partial(self._connect, commanding=False))
         self._query = asyncio.Lock()
         self._arbiter = SendArbiter()
         self._messages = ErrorMessages()
@@ -193,26 +194,21 @@ class Session:
         await self._querying.close()
         await self._channel.close()
 
-    async def _connect(self) -> ControllerCommands:
+    async def _connect(self, *, commanding: bool) -> ControllerCommands:
+        """A connection, without control if it is for queries, which do not need that."""
         async with self._arbiter.line:
-            connection = await Connection.open(self._settings, self._timeouts, self._trace)
-        connection.send_turn = self._arbiter.command_turn
+            to = self._settings, self._timeouts, self._trace
+            connection = await Connection.open(*to, commanding=commanding)
+        connection.send_turn = self._arbiter.command_turn if commanding else self._arbiter.query_turn
         commands = ControllerCommands(connection, self._messages)
         try:
-            await startup.acknowledge_on_completion(commands)
+            if commanding:
+                await startup.acknowledge_on_completion(commands)
             self._require_open()  # it may have been closed meanwhile
         except BaseException:
             await connection.close()
             raise
         return commands
-
-    async def _connect_for_status(self) -> ControllerCommands:
-        """A connection without control, which queries do not need."""
-        async with self._arbiter.line:
-            to = self._settings, self._timeouts, self._trace
-            connection = await Connection.open(*to, commanding=False)
-        connection.send_turn = self._arbiter.query_turn
-        return ControllerCommands(connection, self._messages)
 
     @asynccontextmanager
     async def _status_query(self) -> AsyncIterator[ControllerCommands]:

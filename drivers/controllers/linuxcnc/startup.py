@@ -21,10 +21,8 @@ from hexacell.storage.atomic_files import read_end
 Stopped = Callable[[], bool]
 
 _MODAL_ACTION = "Put it into RS274NGC_STARTUP_CODE, or send it in MDI"
-_LINEAR_UNITS_ACTION = "Set [TRAJ] LINEAR_UNITS = mm in its INI file"
 _OFFSET_MM = 1e-6
 _UNITS_MM = {"MM": 1.0, "CM": 10.0, "INCH": 25.4}
-_FULL_FEED_PERCENT = 100.0
 _MOST_REQUESTS = 2
 _SHOWN_CHARACTERS = 400
 
@@ -61,11 +59,8 @@ async def leave_emergency_stop(commands: ControllerCommands, timeouts: Timeouts)
     """
     await commands.set("estop off", timeouts.command)
     if not await _becomes(commands, "estop", "OFF", timeouts):
-        raise DeviceError(
-            f"stays in emergency stop: {await commands.reason()}",
-            subject=commands.subject,
-            action="Release the emergency stop at the machine",
-        )
+        problem = f"stays in emergency stop: {await commands.reason()}"
+        raise commands.error(problem, "Release the emergency stop at the machine")
 
 
 async def switch_machine(commands: ControllerCommands, timeouts: Timeouts, *, on: bool) -> None:
@@ -84,11 +79,8 @@ async def switch_machine(commands: ControllerCommands, timeouts: Timeouts, *, on
             return
         if errors := await commands.errors():
             break
-    raise DeviceError(
-        f"does not switch {state}: {await commands.reason(tuple(errors))}",
-        subject=commands.subject,
-        action="Look for a message on the controller's own screen",
-    )
+    problem = f"does not switch {state}: {await commands.reason(tuple(errors))}"
+    raise commands.error(problem, "Look for a message on the controller's own screen")
 
 
 async def home_joints(
@@ -113,7 +105,7 @@ async def home_joints(
         _raise_if_stopped(stopped, commands)
         if loop_time() > deadline:
             problem = f"is not homed after {timeout_s:g} s: {await commands.reason()}"
-            raise DeviceError(problem, subject=commands.subject, action="Home it at the machine")
+            raise commands.error(problem, "Home it at the machine")
         await asyncio.sleep(poll_s)
 
 
@@ -150,8 +142,7 @@ async def enter_mdi_mode(commands: ControllerCommands, timeouts: Timeouts) -> No
         await commands.set("mode mdi", timeouts.command)
         if await _becomes(commands, "mode", "MDI", timeouts):
             return
-    problem = f"does not enter MDI mode: {await commands.reason()}"
-    raise DeviceError(problem, subject=commands.subject)
+    raise commands.error(f"does not enter MDI mode: {await commands.reason()}")
 
 
 async def check_coordinate_system(commands: ControllerCommands) -> str:
@@ -163,27 +154,26 @@ async def check_coordinate_system(commands: ControllerCommands) -> str:
         DeviceError: It counts in another unit than the cell file says; or relative moves, a tool length, an
             offset or a feed override is active.
     """
-
-    def refusal(problem: str, action: str) -> DeviceError:
-        return DeviceError(problem, subject=commands.subject, action=action)
-
     units = (await commands.get_if_known("user_linear_units")).upper()
     if units and (unit_mm := _UNITS_MM.get(units)) != commands.unit_mm:
-        action = f"Set controller.unit_mm = {unit_mm:g}" if unit_mm else _LINEAR_UNITS_ACTION
-        raise refusal(f"counts in {units.lower()}, controller.unit_mm is {commands.unit_mm:g}", action)
+        own = "Set [TRAJ] LINEAR_UNITS = mm in its INI file"
+        action = f"Set controller.unit_mm = {unit_mm:g}" if unit_mm else own
+        raise commands.error(
+            f"counts in {units.lower()}, controller.unit_mm is {commands.unit_mm:g}", action
+        )
     text = await commands.get_if_known("program_codes")
     if "G91" in (codes := text.upper().split()):
-        raise refusal("takes coordinates as relative (G91)", f"G90 is needed. {_MODAL_ACTION}")
+        raise commands.error("takes coordinates as relative (G91)", f"G90 is needed. {_MODAL_ACTION}")
     if "G43" in codes:
-        raise refusal("adds a tool length (G43)", f"G49 is needed. {_MODAL_ACTION}")
+        raise commands.error("adds a tool length (G43)", f"G49 is needed. {_MODAL_ACTION}")
     offset = await commands.get_if_known("pos_offset")
     if offset and any(abs(value) > _OFFSET_MM for value in commands.positions_in(offset)):
         action = "Clear it: G10 L2 P1 X0 Y0 Z0 A0 B0 C0 and G92.1 in MDI"
-        raise refusal(f"adds an offset of {offset} to every coordinate (G54, G92)", action)
+        raise commands.error(f"adds an offset of {offset} to every coordinate (G54, G92)", action)
     percent = await commands.get_if_known("feed_override")
-    if percent and parse_number(percent) > _FULL_FEED_PERCENT:
+    if percent and parse_number(percent) > 100.0:
         problem = f"moves {percent} % as fast as it is commanded (feed override)"
-        raise refusal(problem, "Set the feed override to 100 % or less")
+        raise commands.error(problem, "Set the feed override to 100 % or less")
     return text
 
 

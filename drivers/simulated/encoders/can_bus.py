@@ -34,14 +34,11 @@ class SimulatedCanBus(canopen.Network):
     def start(self) -> None:
         self._thread.start()
 
-    def stop(self) -> None:
-        """Become silent permanently; stopping twice is harmless."""
+    def close(self) -> None:
+        """Become silent permanently; closing twice is harmless."""
         self._stopping.set()
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join()
-
-    def close(self) -> None:
-        self.stop()
         if self.bus is not None:
             self.bus.shutdown()
 

@@ -37,10 +37,8 @@ class SimulatedGaugeBank(ServedGroup):
 
     ``plungers`` give, by name of a gauge, the position of its plunger, mm from the middle of the travel, in
     the instrument's own direction, with noise; called from the threads of the lines. ``instruments`` are
-    others than those that are announced, by protocol; a protocol without any is a ``FileError``.
-
-    Attributes:
-        gauges: the settings with the ports on which the gauges are served.
+    others than those that are announced, by protocol; a protocol without any is a ``FileError``. ``gauges``
+    are the settings with the ports on which they are served, ``lines`` the servers of these by name.
     """
 
     def __init__(
@@ -56,22 +54,19 @@ class SimulatedGaugeBank(ServedGroup):
         self._settings = settings
         self._clock = clock
         self._channels: dict[str, int] = {}
-        self._lines: dict[str, GaugeLineServer] = {}
+        self.lines: dict[str, GaugeLineServer] = {}
         with ExitStack() as served:
             for group in self._by_line(gauges):
                 line = served.enter_context(self._serve(group))
-                self._lines |= {gauge.name: line for gauge in group}
+                self.lines |= {gauge.name: line for gauge in group}
             self._served = served.pop_all()
-        self.gauges = tuple(one.model_copy(update={"port": self.line(one.name).address}) for one in gauges)
-
-    def line(self, gauge: str) -> GaugeLineServer:
-        return self._lines[gauge]
+        self.gauges = tuple(one.model_copy(update={"port": self.lines[one.name].address}) for one in gauges)
 
     def faults(self, gauge: str) -> dict[FaultKind, Switch]:
-        line, indicator = self._lines[gauge], self.indicators[gauge]
+        line, indicator = self.lines[gauge], self.indicators[gauge]
         return {
             "unplugged": line.set_unplugged,
-            "silent": line.set_silent,
+            "silent": setting(line, "is_silent"),
             "at its end": setting(indicator, "is_at_end"),
             "off its plate": indicator.set_pushed,
             "off its middle": setting(indicator, "off_middle_mm", OFF_MIDDLE_MM, 0.0),

@@ -75,20 +75,17 @@ class Scpi(Instrument):
 
     def answer(self, command: bytes) -> bytes:
         """A value, a setting, or its name; nothing to what it does not know."""
-        return self._answer(command).replace(b"\n", self.command_end)
-
-    def _answer(self, command: bytes) -> bytes:
-        asked = command.decode("latin-1")
+        asked, said = command.decode("latin-1"), b""
         if not self.indicators[self._values.get(asked, min(self.indicators))].powered:
             return b""
         if asked in self._values:
-            return self._value(self._values[asked])
-        if asked == "*IDN?":
-            return b"HEXACELL,SIMULATED,0,1\n"
-        if asked in self._settings.expect:
+            said = self._value(self._values[asked])
+        elif asked == "*IDN?":
+            said = b"HEXACELL,SIMULATED,0,1\n"
+        elif asked in self._settings.expect:
             changed = any(one.inch for one in self.indicators.values())
-            return (b"OTHER" if changed else self._settings.expect[asked].encode("latin-1")) + b"\n"
-        return b""
+            said = (b"OTHER" if changed else self._settings.expect[asked].encode("latin-1")) + b"\n"
+        return said.replace(b"\n", self.command_end)
 
     def format_value(self, _channel: int, value: float, *, inch: bool) -> bytes:
         mm = value * MM_PER_INCH if inch else value

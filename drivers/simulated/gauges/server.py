@@ -120,7 +120,7 @@ class GaugeLineServer(Closeable):
         self._clock = clock
         self._latency_s = latency_s
         self._byte_s = instrument.bits_a_byte / (baudrate or instrument.baudrate)
-        self._silent = False
+        self.is_silent = False  # every answer is lost
         self._restart_s, self._openings, self._restarted_s = restart_s, line.openings, 0.0
         self._received = b""
         self._answers: deque[tuple[float, bytes]] = deque()
@@ -134,10 +134,6 @@ class GaugeLineServer(Closeable):
     def set_unplugged(self, *, on: bool) -> None:
         """Unplug the line, or plug it in again."""
         self._run_on_thread(self._unplug if on else self._line.plug_in)
-
-    def set_silent(self, *, on: bool) -> None:
-        """Lose every answer, or no more."""
-        self._silent = on
 
     def switch_on(self, channel: int = 1) -> None:
         """Switch an indicator on again; the instrument sends its introduction."""
@@ -210,7 +206,7 @@ class GaugeLineServer(Closeable):
 
     def _answer(self, command: bytes) -> None:
         answer = self.instrument.answer(command)
-        if self._silent:
+        if self.is_silent:
             answer = b""
         late_s = self.faults.delay_s() / self._clock.real_seconds(1.0)
         answer = self.faults.sent(command + self.instrument.command_end, answer)
@@ -229,7 +225,7 @@ class GaugeLineServer(Closeable):
             self._next_unasked = now + late_s / scale
             return
         self._next_unasked = now + max(period_s, SHORTEST_PERIOD_S / scale)
-        for frame in () if self._silent or self._is_restarting() else self.instrument.unasked():
+        for frame in () if self.is_silent or self._is_restarting() else self.instrument.unasked():
             sent = self.faults.sent(b"", frame)
             self._answers.append((now + len(sent) * self._byte_s, sent))
 

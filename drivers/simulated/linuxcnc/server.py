@@ -32,6 +32,7 @@ class SimulatedController(socketserver.ThreadingTCPServer):
     Attributes:
         port: where it listens, on 127.0.0.1.
         state: the state that its clients share.
+        is_silent: every line is lost without a response.
         frozen_answers: by query, while the controller behind the server is frozen.
     """
 
@@ -58,10 +59,6 @@ class SimulatedController(socketserver.ThreadingTCPServer):
         self._is_unplugged = on
         if on:
             self._cut_all()
-
-    def set_silent(self, *, on: bool) -> None:
-        """Lose every line without a response, or no more."""
-        self.is_silent = on
 
     def set_frozen(self, *, on: bool) -> None:
         """Answer every query as it would be answered now and carry out nothing, or work again.

@@ -16,6 +16,7 @@ from drivers.encoders.modbus import ModbusBank
 from drivers.encoders.of_controller import ControllerScales
 from drivers.interfaces import Controller, DeviceIdentity, EncoderBank, EncoderSample, StartupAction
 from drivers.simulated.linuxcnc.server import SimulatedController
+from drivers.simulated.served_device import setting
 from hexacell.cell.devices import EncoderSettings, LinearEncoderSettings
 from hexacell.cell.robot import ControllerSettings
 from hexacell.cell.simulation import FaultKind
@@ -59,7 +60,8 @@ class ScalesTwin:
         self._server = server
 
     def inject(self, fault: FaultKind, *, on: bool) -> None:
-        {"unplugged": self._server.set_unplugged, "silent": self._server.set_silent}[fault](on=on)
+        switch = {"unplugged": self._server.set_unplugged, "silent": setting(self._server, "is_silent")}
+        switch[fault](on=on)
 
 
 class WithItsController:
@@ -182,7 +184,7 @@ class LinuxcncTwin:
             case "unplugged":
                 self._server.set_unplugged(on=on)
             case "silent":
-                self._server.set_silent(on=on)
+                self._server.is_silent = on
             case _:
                 self._server.state.set_estop(on=on)
 

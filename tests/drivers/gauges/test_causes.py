@@ -157,7 +157,7 @@ def test_what_came_in_place_of_a_frame_is_told(received, came, action):
 @pytest.mark.parametrize(("before", "after"), [(b"", b""), (b"\0", b""), (b"", b"\0\0\0")])
 async def test_adapters_that_echo_or_add_zeros_to_frames_are_read(before, after):
     async with cell(["modbus"] * 3, timeout_s=0.5) as made:
-        twin = made.rack.line("x").instrument
+        twin = made.rack.lines["x"].instrument
         answer = twin.answer
         twin.answer = lambda command: command + b"\0\0" + before + answer(command) + after
         await made.gauges["x"].open()
@@ -173,7 +173,7 @@ async def told_for(frame: bytes) -> str:
 
     async with cell(["modbus"] * 3, timeout_s=0.5, stated=stated) as made:
         made.links.worst_latency_s = 0.01
-        made.rack.line("x").instrument.answer = lambda _command: frame + crc(frame)
+        made.rack.lines["x"].instrument.answer = lambda _command: frame + crc(frame)
         with pytest.raises(WrongAnswer) as told:
             await made.gauges["x"].open()
     return str(told.value)
@@ -203,7 +203,7 @@ async def test_flow_control_around_frames_is_no_answer(dialogue, links, settings
 
 async def test_modbus_that_is_only_echoed_names_the_echo():
     async with cell(["modbus"] * 3, timeout_s=0.1) as made:
-        made.rack.line("x").instrument.answer = lambda command: command
+        made.rack.lines["x"].instrument.answer = lambda command: command
         gauge = made.gauges["x"]
         gauge.settings = gauge.settings.model_copy(update={"settle_s": 0.0})
         with pytest.raises(GaugeSilent, match="only the echo of the request comes back"):

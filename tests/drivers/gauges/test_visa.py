@@ -28,7 +28,7 @@ def bench(transport: str = "socket") -> Any:
 
 def answers(made: Any, changed: Mapping[bytes, bytes]) -> None:
     """Other answers to some questions, from now on."""
-    instrument = made.rack.line("x").instrument
+    instrument = made.rack.lines["x"].instrument
     answer = type(instrument).answer.__get__(instrument)
     instrument.answer = lambda command: changed.get(command, answer(command))
 

@@ -1,6 +1,7 @@
 """Durations of ways, and whether a robot can stand at commands."""
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,15 +17,15 @@ from hexacell.limits.leg_limits import LegLimits
 from hexacell.motion.path_check import is_clear, stands_within_limits
 from hexacell.motion.trajectory import (
     SHORTEST_S,
-    LineDurations,
     SpeedLimits,
     interpolate_line,
+    line_duration,
     shortest_duration,
 )
 from hexacell.robot.model import robot_of
 
 ROBOT = robot_of(load_cell(bundled_config("simulated-hexaglide")))
-LINES = LineDurations(Hexaglide(), ROBOT.controller, ROBOT.branch)
+duration_of = partial(line_duration, Hexaglide(), ROBOT.controller, ROBOT.branch)
 LIMITS = SpeedLimits(joint=20.0, edge_mm_s=30.0)
 HOME = Pose(0.0, 0.0, 550.0)
 
@@ -44,7 +45,7 @@ small = st.floats(-20.0, 20.0)
 
 @given(st.builds(Pose, small, small, st.floats(540.0, 560.0), small, small, small))
 def test_the_fastest_piece_is_passed_as_fast_as_allowed_and_none_faster(end: Pose) -> None:
-    duration_s = LINES.of(HOME, end, LIMITS)
+    duration_s = duration_of(HOME, end, LIMITS)
     pieces = 24  # of the simulated controller; another number than the durations are found with
     joints, edge = passed(HOME, end, pieces)
     assert joints.max() * pieces / duration_s <= LIMITS.joint * (1.0 + 1e-6)
@@ -57,7 +58,7 @@ def test_the_fastest_piece_is_passed_as_fast_as_allowed_and_none_faster(end: Pos
 
 
 def test_a_move_to_where_the_robot_is_has_a_duration_and_poses_out_of_reach_do_not_count() -> None:
-    assert LINES.of(HOME, HOME, LIMITS) == SHORTEST_S
+    assert duration_of(HOME, HOME, LIMITS) == SHORTEST_S
     line = interpolate_line(PoseBatch.of([HOME]), PoseBatch.of([Pose(10.0, 0.0, 550.0)]), 4)
     joints = np.zeros((5, 6))
     joints[2, 3] = np.nan

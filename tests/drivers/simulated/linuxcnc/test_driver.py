@@ -57,7 +57,7 @@ async def test_a_frozen_controller_and_one_that_was_ended_are_told_apart(driver,
         await hasty.stop()
     simulated.set_frozen(on=False)
     await hasty.stop()
-    simulated.set_silent(on=True)
+    simulated.is_silent = True
     with pytest.raises(DeviceError, match="not be stopped: it is frozen: it accepts the connection but"):
         await hasty.stop()
     simulated.set_unplugged(on=True)

@@ -98,9 +98,7 @@ def require_serial_port(port: str) -> None:
 def is_link_local(host: str, *, by_name: bool) -> bool:
     """Whether a host, however it is spelt, is a link-local address or one with a cloud's secrets.
 
-    Args:
-        host: a name or an address.
-        by_name: whether a name is looked up, which may take long; else only addresses are known.
+    ``by_name``: a name is looked up, which may take long; else only addresses are known.
     """
     found: list[str] = []
     with suppress(OSError, UnicodeError):  # nobody can be reached there

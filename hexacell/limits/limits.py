@@ -23,8 +23,6 @@ class AxisLimits:
 
     def including(self, pose: PoseBatch) -> AxisLimits:
         """These limits, widened to allow one pose (1)."""
-        if self == NO_AXIS_LIMITS:
-            return self
         numbers = pose.numbers()[0]
         lowest, highest = np.minimum(self.lowest, numbers), np.maximum(self.highest, numbers)
         return AxisLimits(tuple(lowest.tolist()), tuple(highest.tolist()))

@@ -75,9 +75,9 @@ def report(options: argparse.Namespace, console: Console) -> ExitCode:
     run = reported_run(options.run)
     made = report_of(run, earlier)
     output.write(_written(target.suffix, run, made))
-    console.document({"report": str(target), "identifier": made.identifier, "verdict": made.verdict})
+    document = {"report": target, "identifier": made.identifier, "verdict": made.verdict}
     title = certificate.TITLE if target.suffix == CERTIFICATE else made.title.lower()
-    console.print(f"{target}: {title}, {made.verdict}")
+    console.show(document, f"{target}: {title}, {made.verdict}")
     return ExitCode.DONE
 
 

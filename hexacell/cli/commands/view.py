@@ -29,8 +29,8 @@ def main(options: argparse.Namespace, console: Console) -> ExitCode:
     view = view_of_run(reported_run(of)) if of.is_dir() else view_of_cell(cell_at(of, console))
     made = robot_picture(view)[0] if target.suffix == ".svg" else page_of(view)
     output.write(made.encode() + VIEW_MARK)
-    console.document({"view": str(target), "title": view.title, "poses": len(view.poses)})
-    console.print(f"{target}: the robot of {view.title}")
+    document = {"view": target, "title": view.title, "poses": len(view.poses)}
+    console.show(document, f"{target}: the robot of {view.title}")
     if not (options.no_open or options.json or webbrowser.open(target.resolve().as_uri())):
         console.print("There is no browser here: open the file in one")
     return ExitCode.DONE

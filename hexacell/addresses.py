@@ -60,11 +60,7 @@ def address_of(url: str) -> Address:
 
 
 def require_host(host: str) -> None:
-    """Refuse what can be no network name or address.
-
-    Raises:
-        UsageError: it cannot.
-    """
+    """Refuse what can be no network name or address; raises ``UsageError``."""
     try:
         host.encode("idna")
         if ":" in host:
@@ -77,11 +73,7 @@ def require_host(host: str) -> None:
 
 
 def require_serial_port(port: str) -> None:
-    """Refuse a serial port that is neither a device path nor a URL that may be named.
-
-    Raises:
-        UsageError: it is neither, or its host or port cannot be one.
-    """
+    """Refuse what is no device path and no URL that may be named; raises ``UsageError``."""
     scheme, mark, _ = port.lower().partition("://")
     if not mark or scheme in WITHOUT_HOST:
         return

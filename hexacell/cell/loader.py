@@ -197,11 +197,7 @@ def validated(document: toml_document.TomlDocument, model: type[SectionType], pa
 
 
 def _mechanism(document: toml_document.TomlDocument) -> str:
-    """The mechanism that the file names, which decides about its other keys.
-
-    Raises:
-        FileError: it is not installed.
-    """
+    """The mechanism, which decides about other keys; raises ``FileError`` if it is not installed."""
     robot = document.data.get("robot")
     name = robot.get("mechanism") if isinstance(robot, dict) else None
     if not isinstance(name, str):

@@ -273,11 +273,7 @@ class NotificationSettings(Section):
 
 
 def require_sendable(url: str) -> None:
-    """Refuse an address, wherever it is from, by which no notices are sent.
-
-    Raises:
-        UsageError: nothing is sent by its scheme, or it is no address.
-    """
+    """Refuse an address, wherever it is from, by which no notices are sent; raises ``UsageError``."""
     if scheme_of(url) not in TOLD_BY:
         raise UsageError(
             "notices are not sent by this kind of address",

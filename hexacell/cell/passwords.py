@@ -37,9 +37,7 @@ class PasswordFile(Section):
 def with_passwords(settings: CellSettings, folder: Path) -> CellSettings:
     """The settings with the controller's passwords; ``folder`` has the cell file.
 
-    Raises:
-        FileError: the password file cannot be read, has another content, or others can read or change it.
-        UsageError: a variable of the environment has control characters or is too long.
+    Raises as :func:`stated_secrets` does.
     """
     controller = settings.controller
     found = stated_secrets(password_path(controller, folder), PasswordFile, VARIABLES)
@@ -123,11 +121,8 @@ class Login:
 def stated_login(file: str | None, folder: Path, variables: Mapping[str, str]) -> Login | None:
     """Who may log in at a server, if its ``password_file`` or the environment names anybody.
 
-    ``folder`` has the cell file, ``variables`` are those with ``user`` and ``password``.
-
-    Raises:
-        FileError: see :func:`private_content`.
-        UsageError: a variable of the environment has control characters or is too long.
+    ``folder`` has the cell file, ``variables`` are those with ``user`` and ``password``. Raises as
+    :func:`stated_secrets` does.
     """
     found = stated_secrets(None if file is None else folder / file, LoginFile, variables)
     texts = {name: value.get_secret_value() for name, value in found.items()}

@@ -157,11 +157,7 @@ class IniText:
         return any(one.section == name for one in self._variables)
 
     def with_variable(self, section: str, line: str) -> str:
-        """The text with another line behind the last variable that LinuxCNC sees in a section.
-
-        Raises:
-            FileError: there is no such section.
-        """
+        """The text with another line at the end of a section; raises ``FileError`` if there is none."""
         lines = [
             self.text[: self.text.find("\n", one.token.end) + 1 or len(self.text)]
             for one in self._variables

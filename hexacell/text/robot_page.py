@@ -28,11 +28,7 @@ POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inli
 
 
 def page_of(view: RobotView) -> str:
-    """The whole page.
-
-    Raises:
-        UsageError: plotly is not installed.
-    """
+    """The whole page; raises ``UsageError`` where plotly is not installed."""
     try:
         from plotly import graph_objects, io  # noqa: PLC0415 - an optional package
     except ImportError as error:

@@ -192,8 +192,8 @@ def scheme_of(url: str) -> str:
 
 def _require_no_secret(url: str) -> None:
     """Refuse an address that may not stand in a cell file; raises ``UsageError``."""
-    scheme, write = scheme_of(url), "Write https://host/path, mqtts://host or mailto://host?to=..."
-    if "://" in url and scheme not in WITHOUT_TOKENS:
+    write = "Write https://host/path, mqtts://host or mailto://host?to=..."
+    if "://" in url and (scheme := scheme_of(url)) not in WITHOUT_TOKENS:
         action = "Move url to a file of mode 600, and name it password_file"
         raise UsageError(f"an address of {scheme} may have a token in it", action=action)
     try:

@@ -86,7 +86,7 @@ class RobotSettings(Section):
 
 @cache
 def mechanism_of(name: str, *, encoder_scales: bool) -> Mechanism:
-    """A mechanism, with errors of its encoders' scales if wanted; raises ``UsageError`` if not installed."""
+    """A mechanism, with errors of its encoders' scales or not; ``UsageError`` if it is not installed."""
     found: Mechanism = created(Group.MECHANISMS, name)
     return WithEncoderScales(found) if encoder_scales else found
 

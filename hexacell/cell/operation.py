@@ -4,6 +4,7 @@ import re
 from enum import StrEnum
 from functools import partial
 from typing import Annotated, Literal
+from urllib.parse import parse_qs
 
 from pydantic import AfterValidator, field_validator, model_validator
 
@@ -200,10 +201,9 @@ def _require_no_secret(url: str) -> None:
         found = address_of(url)
     except UsageError as error:
         raise UsageError(error.problem, action=write) from error
-    if not found.host or "#" in url:
+    if not found.hostname or "#" in url:
         raise UsageError("this is no address", action=write)
-    password = found.login.partition(":")[2]
-    if (password and password.partition("@")[0] != MASK) or _SECRET_QUERY.search(url):
+    if (found.password or MASK).partition("@")[0] != MASK or _SECRET_QUERY.search(url):
         action = "Move it to a file of mode 600, and name it password_file"
         raise UsageError("a password does not belong here", action=action)
 
@@ -283,5 +283,11 @@ def require_sendable(url: str) -> None:
 
 
 def hosts_of(url: str) -> tuple[str, ...]:
-    """The hosts that an address names; none for a service at a fixed host. Raises ``UsageError``."""
-    return () if scheme_of(url) in CHAT_SERVICES else address_of(url).hosts
+    """The hosts that an address names, as apprise's of mail also do in their query; raises ``UsageError``.
+
+    A service at a fixed host names none.
+    """
+    if scheme_of(url) in CHAT_SERVICES:
+        return ()
+    found = address_of(url)
+    return (found.hostname or "", *parse_qs(found.query).get("smtp", ()))

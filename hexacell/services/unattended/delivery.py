@@ -253,7 +253,7 @@ def publish_by_mqtt(address: NoticeAddress, notice: Notice, timeout_s: float) ->
     url = address_of(address.url)
     is_test = operation.Occasion.TEST in notice.occasions
     try:
-        client.connect(url.host, url.port or PORTS[url.scheme])
+        client.connect(url.hostname or "", url.port or PORTS[url.scheme])
         client.loop_start()
         if not answered.wait(timeout_s):
             raise NoticeUndelivered("the broker does not answer")

@@ -5,10 +5,9 @@ import socket
 import sys
 import threading
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cache
 from ipaddress import IPv6Address, ip_address
-from urllib.parse import SplitResult, parse_qs, urlsplit
+from urllib.parse import SplitResult, urlsplit
 
 from hexacell.errors import UsageError
 
@@ -21,24 +20,8 @@ METADATA = frozenset(map(ip_address, ("fd00:ec2::254", "fd20:ce::254", "100.100.
 LINK_LOCAL = "the address is link-local, or tells the secrets of a cloud"
 
 
-@dataclass(frozen=True, slots=True)
-class Address:
-    """An address with a scheme, such as ``mqtts://user@host:8883/path?query``; ``host`` may be empty."""
-
-    scheme: str
-    login: str
-    host: str
-    port: int | None
-    parts: SplitResult
-
-    @property
-    def hosts(self) -> tuple[str, ...]:
-        """The host, and those that its query names in place of it, as apprise's addresses of mail do."""
-        return (self.host, *parse_qs(self.parts.query).get("smtp", ()))
-
-
-def address_of(url: str) -> Address:
-    """The parts of an address.
+def address_of(url: str) -> SplitResult:
+    """The parts of an address with a scheme, such as ``mqtts://user@host:8883/path?query``.
 
     Raises:
         UsageError: it has no scheme, or its host or port cannot be one.
@@ -46,7 +29,7 @@ def address_of(url: str) -> Address:
     scheme, mark, _ = url.partition("://")
     try:
         parts = urlsplit(url)
-        host, port = parts.hostname or "", parts.port
+        host, port = parts.hostname, parts.port
     except ValueError as error:
         # Its words may have a part of the address in them, which may be secret.
         raise _mistaken("its host or port cannot be one") from error
@@ -56,15 +39,11 @@ def address_of(url: str) -> Address:
         require_host(host)
     if port == 0:
         raise _mistaken("there is no port 0")
-    return Address(parts.scheme, parts.netloc.rpartition("@")[0], host, port, parts)
+    return parts
 
 
 def require_host(host: str) -> None:
-    """Refuse what can be no network name or address.
-
-    Raises:
-        UsageError: it cannot.
-    """
+    """Refuse what can be no network name or address; raises ``UsageError``."""
     try:
         host.encode("idna")
         if ":" in host:
@@ -77,11 +56,7 @@ def require_host(host: str) -> None:
 
 
 def require_serial_port(port: str) -> None:
-    """Refuse a serial port that is neither a device path nor a URL that may be named.
-
-    Raises:
-        UsageError: it is neither, or its host or port cannot be one.
-    """
+    """Refuse what is no device path and no URL that may be named; raises ``UsageError``."""
     scheme, mark, _ = port.lower().partition("://")
     if not mark or scheme in WITHOUT_HOST:
         return
@@ -91,16 +66,14 @@ def require_serial_port(port: str) -> None:
             action="Write a device path, socket://HOST:PORT or rfc2217://HOST:PORT",
         )
     address = address_of(port)
-    if not address.host or address.port is None:
+    if not address.hostname or address.port is None:
         raise _mistaken("it has no host and port")
 
 
 def is_link_local(host: str, *, by_name: bool) -> bool:
     """Whether a host, however it is spelt, is a link-local address or one with a cloud's secrets.
 
-    Args:
-        host: a name or an address.
-        by_name: whether a name is looked up, which may take long; else only addresses are known.
+    ``by_name``: a name is looked up, which may take long; else only addresses are known.
     """
     found: list[str] = []
     with suppress(OSError, UnicodeError):  # nobody can be reached there

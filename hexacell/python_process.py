@@ -8,12 +8,7 @@ import sys
 
 
 def python_command(module: str, *arguments: str) -> tuple[str, ...]:
-    """The command line that runs a module by this interpreter.
-
-    Args:
-        module: its full name, as after ``python -m``.
-        arguments: what it gets in ``sys.argv``.
-    """
+    """The command line that runs a module, named as after ``python -m``, by this interpreter."""
     return (sys.executable, "-P", "-m", module, *arguments)
 
 

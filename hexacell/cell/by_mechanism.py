@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from pydantic import Field, create_model
 
-from hexacell.cell.devices import LinearEncoderSettings, RotaryEncoderSettings
+from hexacell.cell.devices import EncoderSettings, LinearEncoderSettings, RotaryEncoderSettings
 from hexacell.cell.fields import GeometrySettings, InRange, NotNegative, Positive, Section
 from hexacell.cell.limits import LimitSettings, SpeedSettings
 from hexacell.cell.measuring import GuardSettings, NoiseSettings, TimingSettings
@@ -77,17 +77,20 @@ def cell_model(mechanism: str, *, encoder_scales: bool) -> type[CellSettings]:
     truth = SimulationSettings.model_fields["geometry"]
     simulated = _in_unit(found, encoders=SimulatedEncoders, motion=SimulatedMotion, joints=SimulatedJoints)
     simulation = _derived(SimulationSettings, geometry=(geometry, truth), **simulated)
-    uncertainty = uncertainty_settings(found)
-    is_rotary = found.words.joint_unit is JointUnit.DEG
-    encoders = in_joint_unit(
-        RotaryEncoderSettings if is_rotary else LinearEncoderSettings, found.words.joint_unit
-    )
+    encoders: type[EncoderSettings] = LinearEncoderSettings
+    controller: type[ControllerSettings] = ControllerSettings
+    uncertainty: type[CommonUncertaintySettings] = UncertaintySettings
+    if found.words.joint_unit is JointUnit.DEG:
+        encoders = in_joint_unit(RotaryEncoderSettings, JointUnit.DEG)
+        controller, uncertainty = RotaryControllerSettings, RotaryUncertaintySettings
+    elif found.words.guide is None:
+        uncertainty = LinearUncertaintySettings
     return _derived(
         CellSettings,
         uncertainty=(uncertainty, uncertainty()),
         robot=(robot, ...),
         encoders=(encoders, ...),
-        controller=(RotaryControllerSettings if is_rotary else ControllerSettings, ...),
+        controller=(controller, ...),
         tolerances=(tolerances, tolerances() if has_defaults else ...),
         simulation=(simulation | None, None),
         **_in_unit(
@@ -100,13 +103,6 @@ def cell_model(mechanism: str, *, encoder_scales: bool) -> type[CellSettings]:
             model=ModelSettings,
         ),
     )
-
-
-def uncertainty_settings(mechanism: Mechanism) -> type[CommonUncertaintySettings]:
-    """The section of the effects that a mechanism has."""
-    if mechanism.words.joint_unit is JointUnit.DEG:
-        return RotaryUncertaintySettings
-    return LinearUncertaintySettings if mechanism.words.guide is None else UncertaintySettings
 
 
 def _in_unit(mechanism: Mechanism, **sections: type[Section]) -> dict[str, Any]:

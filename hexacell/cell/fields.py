@@ -54,6 +54,10 @@ def outside(expected: str) -> PydanticCustomError:
     return PydanticCustomError("out_of_range", "must be {expected}", {"expected": expected})
 
 
+def _number_from(least: float) -> Any:  # noqa: ANN401 - as pydantic's Field
+    return Field(allow_inf_nan=False, json_schema_extra={"minimum": least, "maximum": LARGEST_NUMBER})
+
+
 def _in_range(value: float) -> float:
     if not abs(value) <= LARGEST_NUMBER:
         raise outside(f"a number within +-{LARGEST_NUMBER:g}")
@@ -122,21 +126,9 @@ def _a_direction(vector: tuple[float, float, float]) -> tuple[float, float, floa
 
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-InRange = Annotated[
-    float,
-    Field(allow_inf_nan=False, json_schema_extra={"minimum": -LARGEST_NUMBER, "maximum": LARGEST_NUMBER}),
-    AfterValidator(_in_range),
-]
-Positive = Annotated[
-    float,
-    Field(allow_inf_nan=False, json_schema_extra={"minimum": SMALLEST_NUMBER, "maximum": LARGEST_NUMBER}),
-    AfterValidator(_positive),
-]
-NotNegative = Annotated[
-    float,
-    Field(allow_inf_nan=False, json_schema_extra={"minimum": 0.0, "maximum": LARGEST_NUMBER}),
-    AfterValidator(_not_negative),
-]
+InRange = Annotated[float, _number_from(-LARGEST_NUMBER), AfterValidator(_in_range)]
+Positive = Annotated[float, _number_from(SMALLEST_NUMBER), AfterValidator(_positive)]
+NotNegative = Annotated[float, _number_from(0.0), AfterValidator(_not_negative)]
 Text = Annotated[str, Field(max_length=LONGEST_TEXT), AfterValidator(_printable)]
 Shown = Annotated[
     str,

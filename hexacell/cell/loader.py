@@ -99,9 +99,7 @@ def load_cell(path: Path) -> Cell:
 def checked_cell(path: Path, text: str) -> Cell:
     """The cell of a file's text, whether the file holds it yet or not; raises as ``load_cell`` does."""
     document = toml_document.TomlDocument.parse(text, path)
-    robot = document.data.get("robot")  # decides about keys of other sections too
-    scales = isinstance(robot, dict) and robot.get("encoder_scales") is True
-    settings = validated(document, cell_model(_mechanism(document), encoder_scales=scales), path)
+    settings = validated(document, _model(document), path)
     _log.info("read the cell file %s: %s", path, settings.name)
     return Cell(path, settings, document)
 
@@ -196,22 +194,19 @@ def validated(document: toml_document.TomlDocument, model: type[SectionType], pa
     return settings
 
 
-def _mechanism(document: toml_document.TomlDocument) -> str:
-    """The mechanism that the file names, which decides about its other keys.
-
-    Raises:
-        FileError: it is not installed.
-    """
-    robot = document.data.get("robot")
-    name = robot.get("mechanism") if isinstance(robot, dict) else None
+def _model(document: toml_document.TomlDocument) -> type[CellSettings]:
+    """The model by the mechanism that the file names; raises ``FileError`` if it is not installed."""
+    stated = document.data.get("robot")
+    robot = stated if isinstance(stated, dict) else {}
+    name = robot.get("mechanism")
     if not isinstance(name, str):
-        return DEFAULT_MECHANISM
+        name = DEFAULT_MECHANISM
     if name not in (known := names(Group.MECHANISMS)):
         action = (
             did_you_mean(name, known) or f"Known are: {', '.join(known)}; or install the package with it"
         )
         raise document.error(("robot", "mechanism"), f"there is no mechanism '{name}'", action)
-    return name
+    return cell_model(name, encoder_scales=robot.get("encoder_scales") is True)
 
 
 def dump(settings: Section, remark: Remark = lambda _: None) -> str:

@@ -2,47 +2,51 @@
 
 import re
 from enum import StrEnum
-from typing import Literal
+from functools import partial
+from typing import Annotated, Literal
+from urllib.parse import parse_qs
 
-from pydantic import field_validator, model_validator
+from pydantic import AfterValidator, field_validator, model_validator
 
 from hexacell.addresses import LINK_LOCAL, address_of, is_link_local
-from hexacell.cell.fields import Host, Name, NotNegative, Positive, Section, Text, broken_rule, key
+from hexacell.cell.fields import (
+    Host,
+    Name,
+    NotNegative,
+    Positive,
+    Section,
+    Text,
+    accepted,
+    broken_rule,
+    key,
+)
 from hexacell.errors import UsageError
 from hexacell.storage.toml_document import MASK
 
 _POSTGRESQL = re.compile(r"postgresql://(?P<login>[^/@]*@)?[^/@]*/[^/?]+(?P<query>\?.*)?")
 
 
+def require_archive(url: str) -> None:
+    """Refuse what is no address of a shared archive; raises ``UsageError``."""
+    write = "Write postgresql://user@host/database"
+    if (found := _POSTGRESQL.fullmatch(url)) is None:
+        raise UsageError("this is no address of a PostgreSQL database", action=write)
+    if ":" in (found["login"] or "") or "password" in (found["query"] or ""):
+        raise UsageError("a password does not belong here", action="Put it into ~/.pgpass, and remove it")
+    try:
+        address_of(url)
+    except UsageError as error:
+        raise UsageError(error.problem, action=write) from error
+
+
 class ArchiveSettings(Section):
     """The index over the cell's runs; the runs themselves are in their folders."""
 
-    url: Text | None = key(
+    url: Annotated[Text, AfterValidator(partial(accepted, require=require_archive))] | None = key(
         None,
         "address of an archive that several cells may share, postgresql://user@host/database; without "
         "it, a file beside the runs. A password belongs in the user's ~/.pgpass",
     )
-
-    @field_validator("url")
-    @classmethod
-    def _names_a_database_and_no_password(cls, url: str | None) -> str | None:
-        mistake = None if url is None else mistake_in_url(url)
-        if mistake is not None:
-            raise broken_rule(*mistake)
-        return url
-
-
-def mistake_in_url(url: str) -> tuple[str, str] | None:
-    """What is wrong with the address of a shared archive, and what to do; None if nothing is."""
-    if (found := _POSTGRESQL.fullmatch(url)) is None:
-        return "this is no address of a PostgreSQL database", "Write postgresql://user@host/database"
-    if ":" in (found["login"] or "") or "password" in (found["query"] or ""):
-        return "a password does not belong here", "Put it into ~/.pgpass, and remove it"
-    try:
-        address_of(url)
-    except UsageError as error:
-        return error.problem, "Write postgresql://user@host/database"
-    return None
 
 
 class OpcUaSettings(Section):
@@ -182,11 +186,33 @@ _SECRET_QUERY = re.compile(r"[?&][^=&]*(?:pass|token|secret|key|auth)[^=&]*=", r
 _WILD = re.compile(r"[#+\0]")
 
 
+def scheme_of(url: str) -> str:
+    """What stands before ``://`` in an address."""
+    return url.partition("://")[0].lower()
+
+
+def _require_no_secret(url: str) -> None:
+    """Refuse an address that may not stand in a cell file; raises ``UsageError``."""
+    write = "Write https://host/path, mqtts://host or mailto://host?to=..."
+    if "://" in url and (scheme := scheme_of(url)) not in WITHOUT_TOKENS:
+        action = "Move url to a file of mode 600, and name it password_file"
+        raise UsageError(f"an address of {scheme} may have a token in it", action=action)
+    try:
+        found = address_of(url)
+    except UsageError as error:
+        raise UsageError(error.problem, action=write) from error
+    if not found.hostname or "#" in url:
+        raise UsageError("this is no address", action=write)
+    if (found.password or MASK).partition("@")[0] != MASK or _SECRET_QUERY.search(url):
+        action = "Move it to a file of mode 600, and name it password_file"
+        raise UsageError("a password does not belong here", action=action)
+
+
 class NotificationSettings(Section):
     """Somebody who is notified of runs without a person."""
 
     name: Name = key(..., "name of the recipient")
-    url: Text | None = key(
+    url: Annotated[Text, AfterValidator(partial(accepted, require=_require_no_secret))] | None = key(
         None,
         "address: https://host/path (webhook, JSON), mqtts://host (MQTT), mailto://host?from=...&to=... "
         "or a chat service's address as apprise has it. One with a token in it belongs in password_file",
@@ -218,14 +244,6 @@ class NotificationSettings(Section):
         "cloud tells its computers",
     )
 
-    @field_validator("url")
-    @classmethod
-    def _has_no_secret(cls, url: str | None) -> str | None:
-        mistake = None if url is None else mistake_in_address(url)
-        if mistake is not None:
-            raise broken_rule(*mistake)
-        return url
-
     @field_validator("on")
     @classmethod
     def _reports_something(cls, on: tuple[OccasionWord, ...]) -> tuple[OccasionWord, ...]:
@@ -254,37 +272,8 @@ class NotificationSettings(Section):
         return self
 
 
-def scheme_of(url: str) -> str:
-    """What stands before ``://`` in an address."""
-    return url.partition("://")[0].lower()
-
-
-def mistake_in_address(url: str) -> tuple[str, str] | None:
-    """What is wrong with an address in a cell file, and what to do; None if nothing is."""
-    scheme, write = scheme_of(url), "Write https://host/path, mqtts://host or mailto://host?to=..."
-    if "://" in url and scheme not in WITHOUT_TOKENS:
-        return (
-            f"an address of {scheme} may have a token in it",
-            "Move url to a file of mode 600, and name it password_file",
-        )
-    try:
-        found = address_of(url)
-    except UsageError as error:
-        return error.problem, write
-    if not found.host or "#" in url:
-        return "this is no address", write
-    password = found.login.partition(":")[2]
-    if (password and password.partition("@")[0] != MASK) or _SECRET_QUERY.search(url):
-        return "a password does not belong here", "Move it to a file of mode 600, and name it password_file"
-    return None
-
-
 def require_sendable(url: str) -> None:
-    """Refuse an address, wherever it is from, by which no notices are sent.
-
-    Raises:
-        UsageError: nothing is sent by its scheme, or it is no address.
-    """
+    """Refuse an address, wherever it is from, by which no notices are sent; raises ``UsageError``."""
     if scheme_of(url) not in TOLD_BY:
         raise UsageError(
             "notices are not sent by this kind of address",
@@ -294,5 +283,11 @@ def require_sendable(url: str) -> None:
 
 
 def hosts_of(url: str) -> tuple[str, ...]:
-    """The hosts that an address names; none for a service at a fixed host. Raises ``UsageError``."""
-    return () if scheme_of(url) in CHAT_SERVICES else address_of(url).hosts
+    """The hosts that an address names, as apprise's of mail also do in their query; raises ``UsageError``.
+
+    A service at a fixed host names none.
+    """
+    if scheme_of(url) in CHAT_SERVICES:
+        return ()
+    found = address_of(url)
+    return (found.hostname or "", *parse_qs(found.query).get("smtp", ()))

@@ -34,17 +34,13 @@ class PasswordFile(Section):
     enable_password: Password | None = None
 
 
-def with_passwords(
-    settings: CellSettings, folder: Path, environment: Mapping[str, str] = os.environ
-) -> CellSettings:
+def with_passwords(settings: CellSettings, folder: Path) -> CellSettings:
     """The settings with the controller's passwords; ``folder`` has the cell file.
 
-    Raises:
-        FileError: the password file cannot be read, has another content, or others can read or change it.
-        UsageError: a variable of the environment has control characters or is too long.
+    Raises as :func:`stated_secrets` does.
     """
     controller = settings.controller
-    found = stated_secrets(password_path(controller, folder), PasswordFile, VARIABLES, environment)
+    found = stated_secrets(password_path(controller, folder), PasswordFile, VARIABLES)
     if not found:
         return settings
     return settings.model_copy(update={"controller": controller.model_copy(update=found)})
@@ -79,15 +75,11 @@ def password_path(controller: ControllerSettings, folder: Path) -> Path | None:
 
 
 def stated_secrets(
-    path: Path | None, model: type[Section], variables: Mapping[str, str], environment: Mapping[str, str]
+    path: Path | None, model: type[Section], variables: Mapping[str, str]
 ) -> dict[str, SecretStr]:
     """Secrets by name: from the environment, or else from a file of their own, if there is one.
 
-    Args:
-        path: the file, if any.
-        model: what the file may hold.
-        variables: the variable of the environment for each name.
-        environment: the variables.
+    ``variables`` has the variable of the environment for each name.
 
     Raises:
         FileError: see :func:`private_content`.
@@ -96,7 +88,7 @@ def stated_secrets(
     content = () if path is None else private_content(path, model)
     found: dict[str, SecretStr] = {name: value for name, value in content if value is not None}
     for name, variable in variables.items():
-        value = environment.get(variable, "")
+        value = os.environ.get(variable, "")
         if len(value) > LONGEST_TEXT or not value.isprintable():
             problem = f"the variable {variable} is too long or has control characters"
             raise UsageError(problem, action="Correct it")
@@ -127,18 +119,12 @@ class Login:
 
 
 def stated_login(file: str | None, folder: Path, variables: Mapping[str, str]) -> Login | None:
-    """Who may log in at a server, if anybody is named.
+    """Who may log in at a server, if its ``password_file`` or the environment names anybody.
 
-    Args:
-        file: its ``password_file``, if any.
-        folder: has the cell file.
-        variables: the variables of the environment with ``user`` and ``password``.
-
-    Raises:
-        FileError: see :func:`private_content`.
-        UsageError: a variable of the environment has control characters or is too long.
+    ``folder`` has the cell file, ``variables`` are those with ``user`` and ``password``. Raises as
+    :func:`stated_secrets` does.
     """
-    found = stated_secrets(None if file is None else folder / file, LoginFile, variables, os.environ)
+    found = stated_secrets(None if file is None else folder / file, LoginFile, variables)
     texts = {name: value.get_secret_value() for name, value in found.items()}
     return Login(**texts) if len(texts) == len(variables) else None
 

@@ -86,11 +86,7 @@ class RobotSettings(Section):
 
 @cache
 def mechanism_of(name: str, *, encoder_scales: bool) -> Mechanism:
-    """The mechanism with this name, with errors of the encoders' scales if these are identified.
-
-    Raises:
-        UsageError: it is not installed.
-    """
+    """A mechanism, with errors of its encoders' scales or not; ``UsageError`` if it is not installed."""
     found: Mechanism = created(Group.MECHANISMS, name)
     return WithEncoderScales(found) if encoder_scales else found
 

@@ -246,11 +246,7 @@ class LengthCheckSettings(Section):
         return self
 
 
-def _an_installed_term(name: str) -> str:
-    return accepted(name, partial(load, Group.TERMS))
-
-
-TermName = Annotated[Text, AfterValidator(_an_installed_term)]
+TermName = Annotated[Text, AfterValidator(partial(accepted, require=partial(load, Group.TERMS)))]
 BUNDLED_TERMS = ("backlash", "play", "compliance")
 """Those looked for by default, whose sizes have keys of their own."""
 

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import ceil, isfinite, log10
+from math import ceil, log10
 from pathlib import Path
 from typing import Protocol
 
@@ -121,20 +121,6 @@ class NumberToken:
     end: int
     line: int
 
-    @property
-    def value(self) -> float:
-        """The number.
-
-        Raises:
-            ValueError: it is not a number, or beyond what a geometry can hold.
-        """
-        if not _NUMBER.fullmatch(self.text):
-            raise ValueError(f"{self.text!r} is not a number")
-        value = float(self.text)
-        if not (isfinite(value) and abs(value) <= LARGEST_NUMBER):
-            raise ValueError(f"{self.text} is not within +-{LARGEST_NUMBER:g}")
-        return value
-
 
 def write_number(value: float, decimals: int, unit: float = 1.0) -> str:
     """``value`` with at most so many decimals and at least one, never ``-0.0``, no exponent.
@@ -161,8 +147,10 @@ def token_error(token: NumberToken, problem: str, source: Path | None, action: s
 
 
 def number_of(token: NumberToken, source: Path | None) -> float:
-    """Its value; raises ``FileError`` with its line if it is no number."""
-    try:
-        return token.value
-    except ValueError as error:
-        raise token_error(token, str(error), source, "Write a plain number there") from error
+    """Its value; raises ``FileError`` with its line if it is none, or beyond what a geometry can hold."""
+    problem = f"{token.text!r} is not a number"
+    if _NUMBER.fullmatch(token.text):
+        if abs(value := float(token.text)) <= LARGEST_NUMBER:
+            return value
+        problem = f"{token.text} is not within +-{LARGEST_NUMBER:g}"
+    raise token_error(token, problem, source, "Write a plain number there")

@@ -153,11 +153,7 @@ class ConfigLayout:
 def _corrections(
     parts: Sequence[interface.ConfigPart], paths: Sequence[Path]
 ) -> tuple[Corrections, Mapping[CorrectionKind, int]]:
-    """The corrections in all files, and which of these has a place for each kind.
-
-    Raises:
-        FileError: two have numbers of the same kind.
-    """
+    """All corrections, and which file has a place for each kind; raises ``FileError`` where two have it."""
     found, places = NO_CORRECTIONS, dict[CorrectionKind, int]()
     for kind in CorrectionKind:
         having = [place for place, one in enumerate(parts) if any(one.corrections.of(kind))]

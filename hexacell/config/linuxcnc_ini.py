@@ -157,11 +157,7 @@ class IniText:
         return any(one.section == name for one in self._variables)
 
     def with_variable(self, section: str, line: str) -> str:
-        """The text with another line behind the last variable that LinuxCNC sees in a section.
-
-        Raises:
-            FileError: there is no such section.
-        """
+        """The text with another line at the end of a section; raises ``FileError`` if there is none."""
         lines = [
             self.text[: self.text.find("\n", one.token.end) + 1 or len(self.text)]
             for one in self._variables
@@ -287,8 +283,8 @@ def _range(ini: IniText, section: str, unit: float) -> interface.Range | None:
     low, high = (_limit(ini, f"{section}/{name}", sign) for name, sign in LIMITS.items())
     if low is None and high is None:
         return None
-    lowest = UNLIMITED[0] if low is None else max(UNLIMITED[0], unit * low.value)
-    highest = UNLIMITED[1] if high is None else min(UNLIMITED[1], unit * high.value)
+    lowest = UNLIMITED[0] if low is None else max(UNLIMITED[0], unit * float(low.text))
+    highest = UNLIMITED[1] if high is None else min(UNLIMITED[1], unit * float(high.text))
     if low is not None and high is not None and lowest >= highest:
         problem = f"MAX_LIMIT of [{section}] is not above its MIN_LIMIT, {low.text}"
         raise interface.token_error(high, problem, ini.source, "Correct one of them")

@@ -53,11 +53,7 @@ class LegCorrections(KeyedConfig):
     """A config of LinuxCNC that may have these beside a geometry, or beside a part of it."""
 
     def read(self, text: str, source: Path | None) -> interface.ConfigPart:
-        """As any keyed config, with play and compliance if the text has a place for them.
-
-        Raises:
-            FileError: with the line of a number that is absent, there twice, none, or not physical.
-        """
+        """As any keyed config, with play and compliance if the text has a place for them."""
         part, lookup = super().read(text, source), self._open(text, source)
         if not any(map(lookup.has, self._pins)):
             return part

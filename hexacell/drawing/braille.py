@@ -5,7 +5,7 @@ from itertools import groupby, pairwise
 
 import numpy as np
 
-from hexacell.drawing.camera import DIRECTION_DEG, Camera
+from hexacell.drawing.camera import Camera
 from hexacell.drawing.shapes import Form, Role, Scene, Shape
 from hexacell.kinematics.rotations import Array
 
@@ -23,11 +23,9 @@ class Run:
     role: Role | None
 
 
-def braille_lines(
-    scene: Scene, width: int, height: int, direction_deg: tuple[float, float] = DIRECTION_DEG
-) -> list[tuple[Run, ...]]:
+def braille_lines(scene: Scene, width: int, height: int) -> list[tuple[Run, ...]]:
     """The picture as ``height`` lines of ``width`` characters, each line in runs of one colour."""
-    camera = Camera.fitted(scene, (2.0 * width, 4.0 * height), 1.0, direction_deg)
+    camera = Camera.fitted(scene, (2.0 * width, 4.0 * height), 1.0)
     ordered = camera.back_to_front(scene)
     bits, roles = np.zeros((height, width), dtype=int), np.full((height, width), None, dtype=object)
     for shape in ordered:

@@ -10,7 +10,7 @@ from hexacell.drawing.shapes import AXIS_ROLES, Form, Role, Scene, Shape
 from hexacell.kinematics.rotations import Array
 
 DIRECTION_DEG = (-64.0, 22.0)
-"""From the front, somewhat from the right and from above: no two of the base's axes cover each other."""
+"""The viewer's azimuth from the x axis and height above the xy plane: no two of the base's axes cover."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,18 +28,9 @@ class Camera:
     origin: Array
 
     @classmethod
-    def fitted(
-        cls,
-        scene: Scene,
-        size: tuple[float, float],
-        margin: float,
-        direction_deg: tuple[float, float] = DIRECTION_DEG,
-    ) -> Camera:
-        """A camera in whose frame, of a width and a height, a scene is as large as possible.
-
-        The viewer is at an azimuth from the x axis and a height above the xy plane (``direction_deg``).
-        """
-        azimuth, height = np.radians(direction_deg)
+    def fitted(cls, scene: Scene, size: tuple[float, float], margin: float) -> Camera:
+        """A camera in whose frame, of a width and a height, a scene is as large as possible."""
+        azimuth, height = np.radians(DIRECTION_DEG)
         right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
         toward = np.array([*np.cos(height) * np.array([np.cos(azimuth), np.sin(azimuth)]), np.sin(height)])
         unfitted = cls(np.stack([right, np.cross(toward, right), toward]), 1.0, np.zeros(2))

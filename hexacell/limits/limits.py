@@ -23,8 +23,6 @@ class AxisLimits:
 
     def including(self, pose: PoseBatch) -> AxisLimits:
         """These limits, widened to allow one pose (1)."""
-        if self == NO_AXIS_LIMITS:
-            return self
         numbers = pose.numbers()[0]
         lowest, highest = np.minimum(self.lowest, numbers), np.maximum(self.highest, numbers)
         return AxisLimits(tuple(lowest.tolist()), tuple(highest.tolist()))
@@ -202,13 +200,8 @@ class Limits:
     ) -> Limits:
         """These limits, widened where a robot is beyond them: it may come back, and not go farther.
 
-        Args:
-            mechanism: of the robot.
-            geometry: of the robot.
-            command: where it was commanded to (1), in the convention's frames.
-            actual: its pose (1).
-            joints: its joint variables there (1, 6), mm.
-            wanted: margins (m,) of passive joints and legs; see :meth:`leg_margins`.
+        Its ``command`` (1) and ``actual`` pose (1) are in the convention's frames, ``joints`` (1, 6) are
+        those there, and ``wanted`` are margins (m,) as of :meth:`leg_margins`.
         """
         both = self.frames.inverse().poses(PoseBatch.joined([command, actual]))
         tilts, turns = both.tilts().tolist(), np.abs(both.turns()).tolist()

@@ -16,7 +16,7 @@ from jinja2 import Template
 from textual_serve.app_service import AppService
 from textual_serve.server import Server, to_int
 
-from hexacell.addresses import Address, address_of
+from hexacell.addresses import address_of
 from hexacell.cell.passwords import Login
 from hexacell.errors import DeviceError, UsageError
 from hexacell.python_process import python_command
@@ -160,20 +160,19 @@ async def serve_screen(
         UsageError: the place is none, or others reach it and there is no login.
         DeviceError: the port is taken, or is no port of this computer.
     """
-    address = _place(place)
-    port = address.port or DEFAULT_PORT
+    named, port = _place(place)
     try:
-        found = await asyncio.get_running_loop().getaddrinfo(address.host, port, type=socket.SOCK_STREAM)
+        found = await asyncio.get_running_loop().getaddrinfo(named, port, type=socket.SOCK_STREAM)
         hosts = list(dict.fromkeys(str(one[4][0]) for one in found))
         is_local = all(map(is_loopback, hosts))
         if login is None and not is_local:
             raise UsageError(
-                f"whoever reaches {address.host} could move the robot",
+                f"whoever reaches {named} could move the robot",
                 subject="[screen]",
                 action="Name a password_file, set HEXACELL_SCREEN_USER and HEXACELL_SCREEN_PASSWORD, "
                 "or serve 127.0.0.1",
             )
-        names = {"localhost", address.host} | (set() if is_local else {socket.gethostname().lower()})
+        names = {"localhost", named} | (set() if is_local else {socket.gethostname().lower()})
         server = ScreenServer(cell, Access(frozenset(names), login))
         runner = web.AppRunner(server.application(), access_log=None, shutdown_timeout=5.0)
         await runner.setup()
@@ -185,7 +184,7 @@ async def serve_screen(
                     f"who reaches {place} with the password can move the robot, and nothing is encrypted. "
                     "In a network of others serve 127.0.0.1, and reach it by `ssh -L`"
                 )
-            ready(f"serving http://{address.parts.netloc}/")
+            ready(f"serving http://{place}/")
             await asyncio.Event().wait()
         finally:
             await runner.cleanup()
@@ -197,8 +196,8 @@ async def serve_screen(
         ) from error
 
 
-def _place(text: str) -> Address:
+def _place(text: str) -> tuple[str, int]:
     address = address_of(f"http://{text}")
-    if address.login or not address.host or address.parts.netloc != text:
+    if "@" in text or not address.hostname or address.netloc != text:
         raise UsageError(f"'{text}' is no place to serve at", action="Write it as ADDRESS:PORT")
-    return address
+    return address.hostname, address.port or DEFAULT_PORT

@@ -123,7 +123,7 @@ def telling_warnings(cell: Cell) -> Iterator[str]:
     for one in cell.settings.notifications:
         if one.url is None or one.password_file is None:
             continue
-        host, scheme = address_of(one.url).host, scheme_of(one.url)
+        host, scheme = address_of(one.url).hostname, scheme_of(one.url)
         if host and scheme in IN_CLEAR and not is_loopback(host):
             yield (
                 f"notification {one.name}: its password goes over the network in clear. Write {scheme}s:// "

@@ -53,7 +53,7 @@ def dask_cluster(address: str, *, patience_s: float = PATIENCE_S) -> NewExecutor
     """
     try:
         named = address_of(address)
-        is_one = named.scheme in {"tcp", "tls"} and bool(named.host) and named.port is not None
+        is_one = named.scheme in {"tcp", "tls"} and bool(named.hostname) and named.port is not None
     except UsageError:
         is_one = False
     if not is_one:

@@ -10,7 +10,7 @@ from hexacell.config.change import BEFORE, kept_paths
 from hexacell.config.layout import names_of
 from hexacell.config.versions import ConfigVersions
 from hexacell.config.write_record import WriteKind, WriteRecord
-from hexacell.text.layout import wrapped
+from hexacell.text.layout import counted, wrapped
 
 if TYPE_CHECKING:
     from hexacell.kinematics.corrections import CorrectionChange
@@ -93,8 +93,7 @@ def _how_much(one: WriteRecord) -> str:
     files = files_named([Path(name) for name in names_of(one.files)])
     if one.numbers_changed is None:
         return f"{files}: how many numbers is not known"
-    plural = "" if one.numbers_changed == 1 else "s"
-    text = f"{files}: {one.numbers_changed} number{plural}"
+    text = f"{files}: {counted(one.numbers_changed, 'number')}"
     if (most := one.largest) is None:
         return text
     return f"{text}, most of all {most.name} by {most.change:+.4f} {most.unit}".rstrip()

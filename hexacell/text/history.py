@@ -25,12 +25,8 @@ def history_text(runs: Sequence[PastRun]) -> str:
     """A line a run of at most 80 columns, in their order; the error is that at the task poses, +- U."""
     if not runs:
         return NO_RUNS
-    return "\n".join([history_head(), *(history_line(run) for run in runs)])
-
-
-def history_head() -> str:
-    """What is in which column of :func:`history_line`."""
-    return _columns("run", "mode", "verdict", "error, mm", "")
+    head = _columns("run", "mode", "verdict", "error, mm", "")
+    return "\n".join([head, *map(history_line, runs)])
 
 
 def history_line(run: PastRun) -> str:

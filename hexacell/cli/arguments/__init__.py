@@ -3,8 +3,9 @@
 import argparse
 
 from hexacell import __version__
-from hexacell.cli.arguments.commands import COMMANDS
+from hexacell.cli.arguments.cells import CELLS
 from hexacell.cli.arguments.parser import Parser
+from hexacell.cli.arguments.runs import RUNS
 
 EXIT_CODES = """exit codes:
   0 done, within limits            4 an answer or approval is needed
@@ -29,9 +30,7 @@ def make_parser() -> Parser:
     )
     parser.add_argument("--version", action="version", version=f"hexacell {__version__}")
     # argparse aligns the commands below with the metavar, which must be about as long as they are.
-    commands = parser.add_subparsers(
-        title="commands", prog="hexacell", metavar="COMMAND [...]", required=True
-    )
-    for add in COMMANDS:
+    commands = parser.add_commands("commands", "COMMAND [...]")
+    for add in (*RUNS, *CELLS):
         add(commands)
     return parser

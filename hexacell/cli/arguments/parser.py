@@ -26,6 +26,10 @@ class Parser(argparse.ArgumentParser):
         """Raise ``UsageError`` with argparse's message."""
         raise UsageError(message, action=f"Try `{self.prog} --help`")
 
+    def add_commands(self, title: str, metavar: str) -> "Commands":
+        """Add a choice of commands, one of which must be given."""
+        return Commands(self.add_subparsers(title=title, prog=self.prog, metavar=metavar, required=True))
+
     def add_cell(self) -> None:
         """Add the cell file."""
         self.add_argument("cell", type=Path, metavar="CELL", help="the cell file (TOML)")
@@ -72,25 +76,33 @@ def output_of(kind: OutputKind) -> Callable[[str], OutputFile]:
     return lambda name: OutputFile(Path(name), kind)
 
 
-def add_parser(commands: Any, name: str, summary: str) -> Parser:  # noqa: ANN401 - argparse's own type is private
-    """Add a command, or one of a command, with a summary that is its description, too."""
-    parser: Parser = commands.add_parser(
-        name, help=summary, description=summary[0].upper() + summary[1:] + "."
-    )
-    # Suppressed defaults: the options of an action must not hide those given before its name.
-    words = "append to this file what the program does; with -v also the bytes on the lines"
-    kind = output_of(LOG)
-    parser.add_argument("--log-file", type=kind, default=argparse.SUPPRESS, metavar="FILE", help=words)
-    words = "log on stderr what the program does; twice: also the bytes on the lines"
-    parser.add_argument("-v", "--verbose", action="count", default=argparse.SUPPRESS, help=words)
-    return parser
+class Commands:
+    """The commands of the program, or those of one of its commands."""
 
+    def __init__(self, made: Any) -> None:  # noqa: ANN401 - argparse's own type is private
+        self._made = made
 
-def add_command(commands: Any, name: str, summary: str, target: str = "") -> Parser:  # noqa: ANN401
-    """Add a command; ``target`` is its module and function in ``hexacell.cli.commands``."""
-    parser = add_parser(commands, name, summary)
-    parser.set_defaults(target=target or f"{name}.main")
-    return parser
+    def add(self, name: str, summary: str, target: str = "") -> Parser:
+        """Add a command with a summary that is its description, too.
+
+        ``target`` is its module and function in ``hexacell.cli.commands``, by default ``main``.
+        """
+        parser = self.add_hidden(
+            name, target or f"{name}.main", help=summary, description=f"{summary[0].upper()}{summary[1:]}."
+        )
+        # Suppressed defaults: the options of an action must not hide those given before its name.
+        words = "append to this file what the program does; with -v also the bytes on the lines"
+        kind = output_of(LOG)
+        parser.add_argument("--log-file", type=kind, default=argparse.SUPPRESS, metavar="FILE", help=words)
+        words = "log on stderr what the program does; twice: also the bytes on the lines"
+        parser.add_argument("-v", "--verbose", action="count", default=argparse.SUPPRESS, help=words)
+        return parser
+
+    def add_hidden(self, name: str, target: str, **settings: str) -> Parser:
+        """Add a command that people never type, so that the help does not list it."""
+        parser: Parser = self._made.add_parser(name, **settings)
+        parser.set_defaults(target=target)
+        return parser
 
 
 def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:

@@ -8,7 +8,7 @@ import json
 from pathlib import Path
 
 from hexacell.cell.loader import Cell, describe, load_cell, require_plugins, schema, settings_document
-from hexacell.cell.operation import mistake_in_url
+from hexacell.cell.operation import require_archive
 from hexacell.cell.passwords import password_warnings, with_passwords
 from hexacell.cli.console import Console
 from hexacell.config.pending_write import settle_config
@@ -63,6 +63,8 @@ def cell_with_devices_at(path: Path, console: Console) -> Cell:
 
 def archive_url(url: str) -> str:
     """The address of an archive that cells share, if it is one; raises ``UsageError``."""
-    if (mistake := mistake_in_url(url)) is not None:
-        raise UsageError(mistake[0], subject="--archive", action=mistake[1])
+    try:
+        require_archive(url)
+    except UsageError as error:
+        raise UsageError(error.problem, subject="--archive", action=error.action) from error
     return url

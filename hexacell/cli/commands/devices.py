@@ -49,8 +49,8 @@ def _set_node(options: argparse.Namespace, console: Console) -> ExitCode:
         raise AnswerNeeded("you have not agreed", action="Nothing was set")
     before = set_node_id(_bus(options.can[0]), options.set_node)
     had = "had none" if before is None else f"had {before}"
-    console.print(f"Node {options.set_node} answers; it {had}.")
-    console.document({"node": options.set_node, "before": before})
+    document = {"node": options.set_node, "before": before}
+    console.show(document, f"Node {options.set_node} answers; it {had}.")
     return ExitCode.DONE
 
 

@@ -1,19 +1,24 @@
-"""``hexacell replay`` and ``report``: a recorded run repeated, or as a page that can be filed."""
+"""``hexacell replay``, ``report`` and ``view``: a run repeated, as a page to be filed, or seen in space."""
 
 import argparse
 import asyncio
+import webbrowser
 from dataclasses import asdict
+from pathlib import Path
 
+from hexacell.cli.commands.cell import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
 from hexacell.services.history.reported_run import ReportedRun, reported_run
 from hexacell.services.history.run_export import export_run
+from hexacell.services.robot_view import view_of_cell, view_of_run
 from hexacell.services.run.replay_run import replay
-from hexacell.storage.output_files import REPORT, OutputFile
+from hexacell.storage.output_files import REPORT, VIEW, VIEW_MARK, OutputFile
 from hexacell.text import certificate
 from hexacell.text.layout import wrapped
 from hexacell.text.report.pages import Report, html_of, pdf_of
 from hexacell.text.report.report import report_of
+from hexacell.text.robot import page_of, robot_picture
 from procedures.replay.recorded_executor import TOLERANCE
 from procedures.replay.replayer import Aspect, ReplayReport, Scope
 
@@ -21,6 +26,7 @@ CERTIFICATE = ".xml"
 """How the name of a file ends that is to be one."""
 
 KINDS = (".html", ".htm", ".pdf", CERTIFICATE)
+KINDS_OF_VIEWS = (".html", ".htm", ".svg")
 
 LISTED_DIFFERENCES = 10
 """How many differences of a replay are printed."""
@@ -75,9 +81,29 @@ def report(options: argparse.Namespace, console: Console) -> ExitCode:
     run = reported_run(options.run)
     made = report_of(run, earlier)
     output.write(_written(target.suffix, run, made))
-    console.document({"report": str(target), "identifier": made.identifier, "verdict": made.verdict})
+    document = {"report": target, "identifier": made.identifier, "verdict": made.verdict}
     title = certificate.TITLE if target.suffix == CERTIFICATE else made.title.lower()
-    console.print(f"{target}: {title}, {made.verdict}")
+    console.show(document, f"{target}: {title}, {made.verdict}")
+    return ExitCode.DONE
+
+
+def view(options: argparse.Namespace, console: Console) -> ExitCode:
+    """Write the view of a cell or a run, and open it unless that is not wanted."""
+    of: Path = options.of
+    default = of / "view.html" if of.is_dir() else of.with_name("view.html")
+    output = options.output or OutputFile(default, VIEW)
+    target = output.path
+    if target.suffix not in KINDS_OF_VIEWS:
+        action = "Name one that ends in .html or .svg"
+        raise UsageError("views of this kind are not made", subject=target, action=action)
+    output.require()
+    shown = view_of_run(reported_run(of)) if of.is_dir() else view_of_cell(cell_at(of, console))
+    made = robot_picture(shown)[0] if target.suffix == ".svg" else page_of(shown)
+    output.write(made.encode() + VIEW_MARK)
+    document = {"view": target, "title": shown.title, "poses": len(shown.poses)}
+    console.show(document, f"{target}: the robot of {shown.title}")
+    if not (options.no_open or options.json or webbrowser.open(target.resolve().as_uri())):
+        console.print("There is no browser here: open the file in one")
     return ExitCode.DONE
 
 

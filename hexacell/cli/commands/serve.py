@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from hexacell.cell.loader import Cell
-from hexacell.cell.operation import OpcUaSettings, ScreenSettings
-from hexacell.cell.passwords import Login, stated_login
+from hexacell.cell.operation import ScreenSettings
+from hexacell.cell.passwords import stated_login
 from hexacell.cli.commands.cell import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
@@ -27,15 +27,12 @@ def results(options: argparse.Namespace, console: Console) -> ExitCode:
         console.warn(f"who reaches {settings.host}:{settings.port} with the password can read results")
     if settings.anonymous:
         console.warn("anybody who reaches the server can read results: anonymous = true in [opcua]")
-    return _until_stopped(_serve_results(cell, settings, console))
-
-
-async def _serve_results(cell: Cell, settings: OpcUaSettings, console: Console) -> None:
     try:
         from hexacell.result_server.server import serve_results  # noqa: PLC0415 - an optional extra
     except ImportError as error:
         raise UsageError("asyncua is not installed", action="Install hexacell[opcua]") from error
-    await serve_results(cell, settings, lambda address: _announce(f"serving {address}"), console.warn)
+    served = serve_results(cell, settings, lambda at: _announce(f"serving {at}"), console.warn)
+    return _until_stopped(served)
 
 
 def simulate(options: argparse.Namespace, console: Console) -> ExitCode:
@@ -61,15 +58,11 @@ def screen(options: argparse.Namespace, console: Console) -> ExitCode:
     path: Path = options.cell
     settings = cell_at(path, console).settings.screen if path.exists() else ScreenSettings()
     login = stated_login(settings.password_file, path.parent, SCREEN_VARIABLES)
-    return _until_stopped(_serve_screen(options, login, console))
-
-
-async def _serve_screen(options: argparse.Namespace, login: Login | None, console: Console) -> None:
     try:
         from hexacell.screen_server.server import serve_screen  # noqa: PLC0415 - an optional extra
     except ImportError as error:
         raise UsageError("textual-serve is not installed", action="Install hexacell[serve]") from error
-    await serve_screen(options.serve, options.cell, login, _announce, console.warn)
+    return _until_stopped(serve_screen(options.serve, path, login, _announce, console.warn))
 
 
 def _until_stopped(serving: Coroutine[Any, Any, None]) -> ExitCode:

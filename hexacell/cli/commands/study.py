@@ -129,7 +129,7 @@ def _draw_sweep(axes: Any, name: str, rows: Mapping[float, Spread]) -> None:  # 
     axes.tick_params(labelsize=7)
 
 
-_ROWS: tuple[ShownStudy, ...] = (
+_ROWS = (
     ShownStudy(
         simulation.PAPER,
         paper_study.study_lines,

@@ -6,7 +6,6 @@ Addresses have their secrets from the environment, or from a file of their own.
 from __future__ import annotations
 
 import logging
-import os
 import re
 import ssl
 import threading
@@ -14,7 +13,7 @@ import time
 import urllib.error
 import urllib.request
 from base64 import b64encode
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from http.client import HTTPException
 from pathlib import Path
@@ -82,12 +81,7 @@ def variable(name: str, part: str) -> str:
     return f"HEXACELL_NOTIFY_{re.sub(r'[^A-Z0-9]+', '_', name.upper()).strip('_')}_{part.upper()}"
 
 
-def resolved_address(
-    settings: operation.NotificationSettings,
-    cell: str,
-    folder: Path,
-    environment: Mapping[str, str] = os.environ,
-) -> NoticeAddress:
+def resolved_address(settings: operation.NotificationSettings, cell: str, folder: Path) -> NoticeAddress:
     """The address of a recipient; ``folder`` has the cell file, ``cell`` is the cell's name.
 
     Raises ``FileError`` if its password file cannot be read, or others can read or change it;
@@ -95,7 +89,7 @@ def resolved_address(
     """
     file = None if settings.password_file is None else folder / settings.password_file
     variables = {part: variable(settings.name, part) for part in PARTS}
-    stated = stated_secrets(file, AddressFile, variables, environment)
+    stated = stated_secrets(file, AddressFile, variables)
     found = {name: value.get_secret_value() for name, value in stated.items()}
     url = found.pop("url", settings.url)
     if not url or "://" not in url:
@@ -259,7 +253,7 @@ def publish_by_mqtt(address: NoticeAddress, notice: Notice, timeout_s: float) ->
     url = address_of(address.url)
     is_test = operation.Occasion.TEST in notice.occasions
     try:
-        client.connect(url.host, url.port or PORTS[url.scheme])
+        client.connect(url.hostname or "", url.port or PORTS[url.scheme])
         client.loop_start()
         if not answered.wait(timeout_s):
             raise NoticeUndelivered("the broker does not answer")

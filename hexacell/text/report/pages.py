@@ -128,11 +128,7 @@ def html_of(report: Report) -> str:
 
 
 def pdf_of(report: Report) -> bytes:
-    """The whole file.
-
-    Raises:
-        UsageError: typst is not installed.
-    """
+    """The whole file; raises ``UsageError`` where typst is not installed."""
     try:
         import typst  # noqa: PLC0415 - an optional package
         from matplotlib import get_data_path  # noqa: PLC0415 - only a PDF needs its fonts

@@ -13,7 +13,7 @@ from hexacell.text.measured_noise import measured_noise_sentences, reversal_sent
 from hexacell.text.report import results, statement
 from hexacell.text.report.pages import Chapter, Facts, Paragraph, Picture, Report, Table, Tone
 from hexacell.text.report.statement import NOT_STATED
-from hexacell.text.robot_picture import robot_picture
+from hexacell.text.robot import robot_picture
 from procedures.run.readings import temperatures_shown
 
 TITLES = {

@@ -1,5 +1,8 @@
 """Where the controller's passwords come from, and who may read them."""
 
+import os
+from unittest.mock import patch
+
 import pytest
 
 from hexacell.cell.loader import Cell, describe, load_cell, settings_document
@@ -25,7 +28,8 @@ def cell_with(cell_text, tmp_path):
 
 
 def passwords_of(cell: Cell, **environment: str) -> tuple[str, str]:
-    found = with_passwords(cell.settings, cell.path.parent, environment).controller
+    with patch.dict(os.environ, environment):
+        found = with_passwords(cell.settings, cell.path.parent).controller
     return found.connect_password.get_secret_value(), found.enable_password.get_secret_value()
 
 

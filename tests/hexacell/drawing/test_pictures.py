@@ -24,11 +24,10 @@ def test_a_camera_shows_all_points_as_large_as_the_frame_allows(any_robot) -> No
 
 def test_the_axes_are_seen_as_by_somebody_who_stands_there() -> None:
     corners = np.concatenate([np.zeros((1, 3)), np.eye(3)])
-    camera = Camera.fitted((Shape(Form.LINE, Role.X, corners),), (100.0, 100.0), 0.0, (-90.0, 0.0))
+    camera = Camera.fitted((Shape(Form.LINE, Role.X, corners),), (100.0, 100.0), 0.0)
     origin, x, y, z = camera.places(corners)
-    assert x[0] > origin[0]
-    assert np.allclose(y, origin)  # he looks along it
-    assert z[1] < origin[1]  # the frame counts downward
+    assert x[0] > y[0] > origin[0]  # in front, somewhat to the right
+    assert z[1] < y[1] < origin[1] < x[1]  # and above; the frame counts downward
 
 
 def test_what_is_nearer_covers_what_is_behind_but_no_word_and_no_error() -> None:

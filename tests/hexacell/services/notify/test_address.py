@@ -1,10 +1,12 @@
 """Where the secrets of an address come from, and that none is shown."""
 
+import os
 import socket
 from ipaddress import ip_address
 from itertools import cycle
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import pytest
 
@@ -21,9 +23,8 @@ CHAT = "slack://hidden-a/hidden-b/hidden-c/#general?footer=hidden-d"
 
 
 def resolve(folder: Path, environment: dict[str, str] | None = None, **settings: Any) -> NoticeAddress:
-    return resolved_address(
-        NotificationSettings(name="night shift", **settings), "cell #1", folder, environment or {}
-    )
+    with patch.dict(os.environ, environment or {}):
+        return resolved_address(NotificationSettings(name="night shift", **settings), "cell #1", folder)
 
 
 def private_file(folder: Path, text: str, mode: int = 0o600) -> str:

@@ -1,4 +1,4 @@
-"""The robot as a page to turn: one file without network, with errors and changes enlarged."""
+"""The robot of a cell or a run: in a picture, or as a page to turn, one file without network."""
 
 from collections.abc import Iterable, Iterator
 from html import escape
@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from hexacell.drawing.robot_scene import base_shapes, moved_shapes
+from hexacell.drawing.robot_scene import base_shapes, moved_shapes, robot_scene
 from hexacell.drawing.shapes import COLOURS, Form, Role, Shape, arrows, enlargement
-from hexacell.drawing.svg import SOLID
+from hexacell.drawing.svg import SOLID, svg_of
 from hexacell.errors import UsageError
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
@@ -26,13 +26,28 @@ THIN = 2.0
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 """Nothing comes from elsewhere, even if a later plotly wants it."""
 
+WORDS = {Role.BEFORE: "as found (brown)", Role.AFTER: "as left (blue)"}
+
+
+def robot_picture(view: RobotView) -> tuple[str, str]:
+    """The robot at its first pose with the errors of held-out poses, as SVG; and that in words."""
+    pose = view.poses[0]
+    shown = [one for one in view.measured if one.name != "records"] or view.measured
+    scene = robot_scene(view.robot, pose)
+    caption = f"The robot at {pose}: legs 1 to 6, the ball between its gauges x, y and z, the base frame."
+    if shown:
+        factor = enlargement((one.vectors for one in shown), view.robot.size(pose))
+        for one in shown:
+            scene += arrows(one.role, one.planned, factor * one.vectors)
+        sides = " and ".join(
+            f"{WORDS[one.role]}, up to {np.linalg.norm(one.vectors, axis=-1).max():.3f} mm" for one in shown
+        )
+        caption += f" Arrows: where the ball was instead, {factor:g} times as far: {sides}."
+    return svg_of(scene, view.title, caption), caption
+
 
 def page_of(view: RobotView) -> str:
-    """The whole page.
-
-    Raises:
-        UsageError: plotly is not installed.
-    """
+    """The page, with errors and changes enlarged; raises ``UsageError`` where plotly is not installed."""
     try:
         from plotly import graph_objects, io  # noqa: PLC0415 - an optional package
     except ImportError as error:

@@ -106,10 +106,8 @@ def whiten_records(
 ) -> WhitenedRecords:
     """The records of a problem that have a pose under the geometry of ``free`` parameters (p,), mm.
 
-    Args:
-        problem: its systematic errors are those that all runs of the machine share.
-        free: where to linearize, near the truth.
-        of_this_run: systematic errors that are others in each run.
+    They are linearized there, near the truth. The problem's systematic errors are those that all runs of a
+    machine share; those ``of_this_run`` are others in each.
     """
     solved = problem.solve_poses(free)
     kept = problem.subset(solved.found)

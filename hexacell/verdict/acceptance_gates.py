@@ -36,14 +36,7 @@ class AcceptanceGate(Frozen):
 def gates_of_run(
     settings: CellSettings, robot: Robot, result: IdentificationResult, expired: Sequence[str] | None = None
 ) -> tuple[AcceptanceGate, ...]:
-    """The gates of a run, by its result.
-
-    Args:
-        settings: of the cell.
-        robot: with the controller's geometry as it was before.
-        result: of the identification.
-        expired: as in :func:`gates`.
-    """
+    """The gates of a run, by its result; the ``robot`` has the controller's geometry as it was before."""
     identified = result.estimate(robot.mechanism.parameters)
     return gates(
         identified,

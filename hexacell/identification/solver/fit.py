@@ -184,8 +184,8 @@ def solve(problem: Problem, precision: Array, start: Prediction, options: Solver
             ended = following
         else:
             now = following
-    information, chi2 = now.linear.information(), now.linear.cost()
-    return Solution(now.prediction, information, chi2, iterations, ended, now.singular)
+    information, values = now.linear.information(), now.linear.values
+    return Solution(now.prediction, information, float(values @ values), iterations, ended, now.singular)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -104,9 +104,7 @@ class Task:
         reached = self.reachable(belief)
         if not len(reached.poses) or not len(reached.workspace):
             return None
-        propagation = Propagation.of(
-            found, belief, task=reached.poses, workspace=reached.workspace, earlier=earlier, zeros=zeros
-        )
+        propagation = Propagation(found, belief, reached.poses, reached.workspace, earlier or {}, zeros)
         return UncertaintyBudget.of(propagation, effects, scale)
 
     def error(self, belief: RobotBelief, recorded: PoseBatch | None = None) -> TaskError | None:

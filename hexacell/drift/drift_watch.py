@@ -182,12 +182,7 @@ class DriftWatch:
 
 
 def watch_runs(runs: Iterable[RunEvidence], causes: Causes) -> tuple[tuple[StepAlarm, ...], Array]:
-    """What a series of runs says of changes.
-
-    Returns:
-        The changes, oldest first, each by all runs until the next one, and the sums (m,) in the end, as
-        shares of their limit.
-    """
+    """The changes, oldest first, each by all runs until the next one, and :attr:`.share_of_limit` then."""
     watch = DriftWatch(causes)
     for run in runs:
         watch.add(run)

@@ -208,11 +208,6 @@ class Identification:
         return self.problem.records
 
     @property
-    def points(self) -> int:
-        """How many points have records."""
-        return self.problem.points
-
-    @property
     def residual_rms_mm(self) -> float:
         """Root mean square of the centred residuals of the deviations."""
         elimination = NuisanceElimination(self.problem, self.prediction.weights)

@@ -113,7 +113,7 @@ def fit_regularized(
     kept, first = solve_around_singularities(problem, problem.prior.precision, options, start)
     # Residuals below the stated noise justify more information than stated: without it, a prior would bias
     # records with hardly any noise.
-    redundancy, correction = kept.coordinates - len(first.free), 1.0
+    redundancy, correction = kept.coordinates - len(first.information), 1.0
     if redundancy >= LEAST_REDUNDANCY:
         correction = max(1.0, redundancy / max(first.chi2, SMALLEST_CHI2))
     # The prior's precision stays in the directions that the data do not determine.
@@ -142,7 +142,7 @@ def solve_around_singularities(
         solution = solve(kept, precision, predict(kept, free, poses), options)
         if search == options.searches:
             break
-        free, poses = solution.free, solution.prediction.poses
+        free, poses = solution.prediction.free, solution.prediction.poses
         if solution.termination is Termination.SINGULAR and not solution.singular.all():
             used[np.flatnonzero(used)[solution.singular]] = False
             poses = poses[~solution.singular]

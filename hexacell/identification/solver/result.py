@@ -102,11 +102,6 @@ class Solution:
     termination: Termination
     singular: Mask
 
-    @property
-    def free(self) -> Array:
-        """Free parameters (p,), mm."""
-        return self.prediction.free
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GeometryEstimate:
@@ -151,7 +146,7 @@ class Identification:
     @property
     def free(self) -> Array:
         """The free parameters (p,), mm."""
-        return self.solution.free
+        return self.prediction.free
 
     @cached_property
     def free_covariance(self) -> Array:

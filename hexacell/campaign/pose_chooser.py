@@ -155,7 +155,8 @@ class PoseChooser:
     def _criterion(self, belief: RobotBelief) -> Criterion:
         name = self.settings.identification.criterion
         if name == "parameters":
-            scaled = belief.basis / belief.mechanism.parameters.like_a_mm[:, None]
+            mechanism = belief.mechanism
+            scaled = mechanism.convention.basis / mechanism.parameters.like_a_mm[:, None]
             return Criterion(scaled.T @ scaled)
         if name == "information" and self.robot.identifies is not ParameterChoice.ALL:
             columns = zero_columns(self.robot.mechanism, self.robot.controller)

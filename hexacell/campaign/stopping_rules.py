@@ -21,7 +21,7 @@ class Goal(Protocol):
     def reached(self, measurements: MeasurementSet) -> str | None:
         """The reason why the records are enough; None if they are not."""
 
-    def reached_at(self, point: int, measurements: MeasurementSet) -> str | None:
+    def reached_at(self, point: int, measurements: MeasurementSet, /) -> str | None:
         """The reason why a point needs no more records, although others may; None if it does."""
 
 

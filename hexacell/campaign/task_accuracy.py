@@ -15,7 +15,7 @@ from hexacell.identification.estimator import estimate_online
 from hexacell.identification.identified_zeros import HeldParameters, IdentifiedZeros
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.kinematics.rotations import Array, Mask
+from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot
 from hexacell.robot.virtual_robot import exact_records
@@ -104,9 +104,7 @@ class Task:
         reached = self.reachable(belief)
         if not len(reached.poses) or not len(reached.workspace):
             return None
-        propagation = Propagation.of(
-            found, belief, task=reached.poses, workspace=reached.workspace, earlier=earlier, zeros=zeros
-        )
+        propagation = Propagation(found, belief, reached.poses, reached.workspace, earlier or {}, zeros)
         return UncertaintyBudget.of(propagation, effects, scale)
 
     def error(self, belief: RobotBelief, recorded: PoseBatch | None = None) -> TaskError | None:
@@ -133,21 +131,15 @@ class Task:
 
         Without what another choice of frames would explain; None if no task pose can be taken.
         """
-        taken = _are_taken(belief, PoseBatch.joined([self.poses, self.workspace]))
-        task, workspace = (np.flatnonzero(some) for some in np.split(taken, [len(self.poses)]))
-        if not len(task) or not len(workspace):
+        reached = self.reachable(belief)
+        if not len(reached.poses) or not len(reached.workspace):
             return None
-        return error_jacobian(belief, self.poses[task], self.workspace[workspace])
+        return error_jacobian(belief, reached.poses, reached.workspace)
 
 
 def _reachable(belief: RobotBelief, poses: PoseBatch) -> PoseBatch:
-    return poses[np.flatnonzero(_are_taken(belief, poses))]
-
-
-def _are_taken(belief: RobotBelief, poses: PoseBatch) -> Mask:
-    """Which of n poses the estimated robot reaches."""
     joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
-    return np.asarray(np.isfinite(joints).all(axis=-1))
+    return poses[np.flatnonzero(np.isfinite(joints).all(axis=-1))]
 
 
 def planned_budget(

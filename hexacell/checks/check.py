@@ -66,20 +66,18 @@ class ScaledEstimate:
 
 
 class DriftEstimator:
-    """Estimates one robot under each scale of its drift since it was identified."""
+    """Estimates one robot under each scale of its drift since it was identified.
+
+    ``robot`` has what is known of it before the first record, under the guarded scale.
+    """
 
     def __init__(self, robot: Robot, before: IdentifiedBefore) -> None:
-        self._robots = {
-            scale: replace(robot, known=before.prior(scale)) for scale in USUAL_SCALES + LARGE_SCALES
-        }
+        scales = USUAL_SCALES + LARGE_SCALES
+        robots = {scale: replace(robot, known=before.prior(scale)) for scale in scales}
+        self.robot = robots[GUARDED_SCALE]
         self._estimators = {
-            scale: OnlineEstimator(one, tries_other_starts=False) for scale, one in self._robots.items()
+            scale: OnlineEstimator(one, tries_other_starts=False) for scale, one in robots.items()
         }
-
-    @property
-    def robot(self) -> Robot:
-        """The robot with what is known of it before the first record, under the guarded scale."""
-        return self._robots[GUARDED_SCALE]
 
     def estimate(self, measurements: MeasurementSet) -> OnlineEstimate:
         """The estimate that poses are chosen by."""
@@ -181,7 +179,7 @@ class Check:
         ``effects`` are the systematic ones as they are known by then.
         """
         stated = self._statement(measurements, effects)
-        if stated is None or stated.is_decided:
+        if stated is None or stated.verdict.is_final:
             return stated
         likeliest, guarded = self._estimates(measurements)
         errors, further = (self._errors(likeliest, effects), self._errors(guarded, effects)), None
@@ -198,7 +196,7 @@ class Check:
 
     def _decided(self, measurements: MeasurementSet) -> str | None:
         stated = self.statement(measurements)
-        if stated is None or not stated.is_decided:
+        if stated is None or not stated.verdict.is_final:
             return None
         error = stated.errors.position
         unit = unit_of(error.value, error.expanded)

@@ -86,17 +86,22 @@ class QuickLevel:
         return self._before.prior(1.0)
 
     def reached(self, measurements: MeasurementSet) -> str | None:
-        """The reason why the records are enough; None if they are not."""
-        error, wanted = self._known_error(measurements), self.calibrated_mm
+        """The reason why the records are enough; None if they are not.
+
+        They alone have to determine a geometry, and be tested.
+        """
+        if not len(measurements):
+            return None
+        estimate, wanted = self._drifting.likeliest(measurements).estimate, self.calibrated_mm
+        found = estimate.identification
+        if found is None or not found.problem.is_overdetermined:
+            return None
+        error = self._worst(estimate.belief)
         if error is None or wanted is None or error > AS_ACCURATE * wanted:
             return None
         return f"the predicted error at the task poses is {shown(error)}, that of the last calibration"
 
-    def reached_at(
-        self,
-        point: int,  # noqa: ARG002 - of the protocol
-        measurements: MeasurementSet,
-    ) -> str | None:
+    def reached_at(self, _point: int, measurements: MeasurementSet) -> str | None:
         """The reason why a point needs no more records: that all together are enough."""
         return self.reached(measurements)
 
@@ -123,16 +128,6 @@ class QuickLevel:
             further=tuple(FurtherRecords(records=n, error_mm=errors[n]) for n in FURTHER_RECORDS),
             records_to_calibrated=next((n for n, mm in enumerate(errors) if mm <= enough), None),
         )
-
-    def _known_error(self, measurements: MeasurementSet) -> float | None:
-        """The predicted error, where the records alone would determine a geometry and be tested."""
-        if not len(measurements):
-            return None
-        estimate = self._drifting.likeliest(measurements).estimate
-        found = estimate.identification
-        if found is None or not found.problem.is_overdetermined:
-            return None
-        return self._worst(estimate.belief)
 
     def _errors_after(self, estimate: ScaledEstimate) -> list[float]:
         """The predicted error after 0, 1, 2, ... more records, as informative as well spread ones."""

@@ -40,13 +40,8 @@ def with_best_sides(
 ) -> SelectedPose:
     """A selected pose, over a waypoint before it where other sides gain more; else as it is.
 
-    Args:
-        planner: of the paths from where the robot is.
-        zero: of the point's gauges.
-        selected: the pose, with its path.
-        back: how far every joint stands beside its place at the waypoint, in its unit; 0 for no waypoint.
-        criterion: by which the pose was selected, and so are the sides.
-        known_then: as of :func:`.select_pose`.
+    At the waypoint every joint stands beside its place by ``back``, in its unit; 0 for no waypoint. Sides
+    are selected as the pose was, see :func:`.select_pose`.
     """
     belief, straight = planner.belief, selected.record
     if not back or belief.terms is None or not any(one.needs_directions for one in belief.terms.terms):

@@ -52,9 +52,8 @@ def orientations(
 ) -> Array:
     """``count`` rotations (count, 3, 3): tilts up to ``tilt``, rad, after twists up to twice as large.
 
-    No twist is larger than ``most_twist``, rad.
-
-    They are quasi-random, from a scrambled Sobol' sequence; ``count`` is a power of two.
+    No twist is larger than ``most_twist``, rad. They are quasi-random, from a scrambled Sobol' sequence;
+    ``count`` is a power of two.
     """
     from scipy.stats import qmc  # noqa: PLC0415 - half a second that only this function needs
 

@@ -218,7 +218,7 @@ class _Scenario:
         errors = variates @ np.linalg.cholesky(belief.covariance).T
         # Each robot at each pose is one row: all poses of the first robot, then those of the next one.
         rows = np.tile(at, len(errors))
-        vectors = belief.estimate.vector + errors @ belief.basis.T
+        vectors = belief.estimate.vector + errors @ mechanism.convention.basis.T
         geometries = GeometryBatch(mechanism.parameters, vectors.repeat(len(at), axis=0))
         # Newton's method starts where linear propagation puts the pose of each robot.
         steps = (errors @ self.sensitivity.free[at].reshape(-1, errors.shape[1]).T).reshape(-1, 6)

@@ -155,7 +155,7 @@ class DriftWatch:
         """Find the step before one of the latest runs; the watch goes on from there."""
         offset, before = self._periods[-1]
         gains = self._gains()
-        legs, _ = self._likeliest(gains, gains.likeliest[0])
+        legs, _ = self._likeliest(gains, int(gains.gains.max(axis=1).argmax()))
         of_leg = np.where(self._causes.legs == legs[0], gains.gains, -1.0)
         place, cause = (int(one) for one in np.unravel_index(of_leg.argmax(), of_leg.shape))
         start = offset + place
@@ -182,12 +182,7 @@ class DriftWatch:
 
 
 def watch_runs(runs: Iterable[RunEvidence], causes: Causes) -> tuple[tuple[StepAlarm, ...], Array]:
-    """What a series of runs says of changes.
-
-    Returns:
-        The changes, oldest first, each by all runs until the next one, and the sums (m,) in the end, as
-        shares of their limit.
-    """
+    """The changes, oldest first, each by all runs until the next one, and :attr:`.share_of_limit` then."""
     watch = DriftWatch(causes)
     for run in runs:
         watch.add(run)

@@ -106,10 +106,8 @@ def whiten_records(
 ) -> WhitenedRecords:
     """The records of a problem that have a pose under the geometry of ``free`` parameters (p,), mm.
 
-    Args:
-        problem: its systematic errors are those that all runs of the machine share.
-        free: where to linearize, near the truth.
-        of_this_run: systematic errors that are others in each run.
+    They are linearized there, near the truth. The problem's systematic errors are those that all runs of a
+    machine share; those ``of_this_run`` are others in each.
     """
     solved = problem.solve_poses(free)
     kept = problem.subset(solved.found)
@@ -121,19 +119,14 @@ def whiten_records(
     jacobian = np.concatenate([prediction.jacobian, shared.common, own.common], axis=-1)
     system = NuisanceElimination(kept, weights).system(residuals, jacobian)
     rows, causes = np.split(system.rows, [len(free) + shared.common.shape[-1]], axis=1)
-    whitened = _whitened(causes, np.column_stack([rows, system.values]))
+    whitened = np.column_stack([rows, system.values])
+    if causes.shape[1]:  # of unit variance, and noise of this run
+        from scipy.linalg import solve_triangular  # noqa: PLC0415 - a tenth of a second
+
+        factor = np.linalg.cholesky(np.eye(len(causes)) + causes @ causes.T)
+        whitened = solve_triangular(factor, whitened, lower=True)
     state = np.concatenate([free, np.zeros(shared.common.shape[-1])])
     return WhitenedRecords(state, whitened[:, :-1], whitened[:, -1])
-
-
-def _whitened(causes: Array, values: Array) -> Array:
-    """Values (r, m) for which causes (r, k) of unit variance count as noise."""
-    if not causes.shape[1]:
-        return values
-    factor = np.linalg.cholesky(np.eye(len(causes)) + causes @ causes.T)
-    from scipy.linalg import solve_triangular  # noqa: PLC0415 - a tenth of a second
-
-    return solve_triangular(factor, values, lower=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -190,12 +183,6 @@ class StepGains:
     gains: Array
     changes: Array
     sigmas: Array
-
-    @property
-    def likeliest(self) -> tuple[int, int]:
-        """The run that the step was before, and its cause."""
-        run, cause = np.unravel_index(self.gains.argmax(), self.gains.shape)
-        return int(run), int(cause)
 
     def likely_runs(self, cause: int) -> tuple[int, int]:
         """The first and the last run that a step by this cause may have been before."""

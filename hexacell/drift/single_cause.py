@@ -59,12 +59,10 @@ class SingleCauseTest:
 
 
 def single_cause_test(records: WhitenedRecords, covariance: Array, causes: Array) -> SingleCauseTest:
-    """Test each of m causes.
+    """Test each of m ``causes`` (m, s), changes of the state by one unit.
 
-    Args:
-        records: linearized at the previous estimate.
-        covariance: (s, s) of the state then; 1 for shared causes of which nothing is known.
-        causes: (m, s) change of the state by one unit of each cause.
+    By records linearized at the previous estimate, and the ``covariance`` (s, s) of the state then; 1 for
+    shared causes of which nothing is known.
     """
     rows, residuals = records.rows, records.residuals
     factor = np.linalg.cholesky(np.eye(len(rows)) + rows @ covariance @ rows.T)
@@ -95,10 +93,7 @@ def _largest_by_chance(unit: Array) -> float:
 def possible_groups(scores: Array, sigmas: Array, groups: NDArray[np.int_]) -> tuple[int, ...]:
     """Groups of causes, such as legs, of which one changed: the likeliest, with ``CERTAIN`` together.
 
-    Args:
-        scores: (m,) of single causes.
-        sigmas: (m,) standard deviations of the estimates of each change.
-        groups: (m,) the group of each cause.
+    By the ``scores`` (m,) of single causes, and the ``sigmas`` (m,) of the estimates of each change.
     """
     with np.errstate(divide="ignore"):
         ratio = (USUAL_CHANGE / sigmas) ** 2

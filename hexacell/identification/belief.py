@@ -87,11 +87,6 @@ class RobotBelief:
         of_terms = joint_covariance[free:, free:]
         return replace(known, terms=replace(self.terms, covariance=of_terms, with_parameters=crossed))
 
-    @property
-    def basis(self) -> Array:
-        """Matrix (P, p) from the free parameters to all of them."""
-        return self.mechanism.convention.basis
-
     @cached_property
     def estimate(self) -> Geometry:
         """The estimated geometry."""
@@ -155,9 +150,8 @@ class RobotBelief:
         changes = np.vstack([np.zeros(len(self.free)), one_sigma])
         count, every = len(joints), len(changes)
         rows = np.arange(count).repeat(every)
-        robots = GeometryBatch(
-            self.mechanism.parameters, np.tile(self.estimate.vector + changes @ self.basis.T, (count, 1))
-        )
+        vectors = self.estimate.vector + changes @ self.mechanism.convention.basis.T
+        robots = GeometryBatch(self.mechanism.parameters, np.tile(vectors, (count, 1)))
         steps = changes @ np.swapaxes(sensitivity.free, -1, -2)
         moved = apply_twist(poses[rows], steps.reshape(-1, 6))
         margins = self.limits.leg_margins(self.mechanism, robots, moved, joints[rows])

@@ -34,13 +34,7 @@ SMALLEST_ROTATION = 1e-3
 def identify(problem: Problem, *, find_outliers: bool = True) -> Identification:
     """Identify the geometry from all records, without those that have a data fault.
 
-    Args:
-        problem: n records, with the prior and the noise.
-        find_outliers: whether records are tested; without it all of them are used.
-
-    Returns:
-        The p free parameters, mm, with their covariance (p, p), mm^2, and what is wrong with the records
-        that were left out.
+    Without ``find_outliers`` no record is tested, and all of them are used.
 
     Raises:
         IdentifiabilityError: the records cannot determine the parameters.

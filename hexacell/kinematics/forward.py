@@ -113,16 +113,10 @@ def forward_kinematics(
 ) -> ForwardResult:
     """Poses of n joint vectors by damped Newton's method; a pose that has converged is not changed further.
 
-    Args:
-        mechanism: of the robot.
-        geometry: one for all poses, or one for each.
-        joints: joint variables (n, 6), in their unit.
-        start: n nearby poses.
-        mode: required assembly mode (n,); by default that of ``start``.
-        tolerance_mm: largest constraint of a solution, mm.
-        max_steps: number of Newton steps.
-        largest_contraction: poses of which a step is more than this share of the one before are not found;
-            with less than 1, nor those whose first step is too large.
+    ``joints`` (n, 6) are in their unit, and ``start`` are n nearby poses, whose assembly ``mode`` (n,) is
+    required by default. No constraint of a solution is larger than ``tolerance_mm``. Poses of which a step
+    is more than the ``largest_contraction`` of the one before are not found; with less than 1, nor those
+    whose first step is too large.
     """
     positions, orientations = np.array(start.positions), np.array(start.rotations)
     found = np.zeros(len(joints), dtype=bool)
@@ -168,16 +162,10 @@ def continue_solution(
     start_joints: Array | None = None,
     stage_counts: Sequence[int] = CONTINUATION_STAGES,
 ) -> ForwardResult:
-    """Poses of n joint vectors by continuation from n known poses.
+    """Poses of n joint vectors (n, 6), in their unit, by continuation from n known poses.
 
-    Args:
-        mechanism: of the robot.
-        geometry: one for all poses, or one for each.
-        joints: joint variables (n, 6), in their unit.
-        start: n poses that close ``start_geometry`` at ``start_joints``.
-        start_geometry: one for all poses.
-        start_joints: (n, 6); by default ``joints``, so that only the geometry changes.
-        stage_counts: numbers of stages; the next one is tried for the poses where one fails.
+    Those close ``start_geometry`` at ``start_joints`` (n, 6): by default ``joints``, so that only the
+    geometry changes. The next of the ``stage_counts`` is tried for the poses where one fails.
     """
     if start_joints is None:
         start_joints = joints

@@ -126,13 +126,9 @@ def by_pose(b: Array, n: Array) -> Array:
 
 
 def axes_through(first: Array, second: Array, third: Array, part: str) -> Array:
-    """The axes (3, 3), in rows, that three joints fix.
+    """The axes (3, 3), in rows, that three joints (3,), mm, of a ``part``, base or platform, fix.
 
-    Args:
-        first: the joint (3,), mm, from which x points to the second.
-        second: (3,), mm.
-        third: the joint (3,), mm, toward which y points; z is normal to the plane of all three.
-        part: base or platform, for messages.
+    x points from the first to the second, y toward the third, and z is normal to the plane of all three.
 
     Raises:
         UsageError: the joints are in one line, or two of them at one place.

@@ -44,15 +44,10 @@ csv.field_size_limit(LARGEST_FILE_BYTES)  # a column that is ignored may hold an
 
 
 def read_measurements(path: Path, *, allow_partial: bool = False) -> MeasurementSet:
-    """Read a measurement file.
+    """Read the records of a measurement file, in the order of its rows.
 
-    Args:
-        path: the file, CSV.
-        allow_partial: accept the file of an unfinished calibration: without rows, or even without a header,
-            and with one row at a point.
-
-    Returns:
-        The records in the order of the rows: joints in mm or deg, deviations in mm, poses in mm and deg.
+    With ``allow_partial`` it may be of an unfinished calibration: without rows, or even without a header,
+    and with one row at a point.
 
     Raises:
         FileError: the file cannot be read, a column is missing, a cell is not a number, a record occurs

@@ -108,15 +108,10 @@ def approach_scatter(
     gauges_mm: Array,
     joint_unit: JointUnit = JointUnit.MM,
 ) -> RepeatedApproaches | None:
-    """The scatter of visits of one pose; None with fewer than ``FEWEST_VISITS``.
+    """The scatter of m visits of one pose; None with fewer than ``FEWEST_VISITS``.
 
-    Args:
-        deviations: of the ball along base x, y, z (m, 3), mm.
-        joints: what the encoders showed (m, 6), mm.
-        ball: how it moves by what the encoders show.
-        encoders: stated noise of each encoder (6,) in a record.
-        gauges_mm: likewise of the gauges (3,).
-        joint_unit: of the joint variables.
+    By ``deviations`` of the ball along base x, y, z (m, 3), mm, and what the encoders showed, ``joints``
+    (m, 6). ``encoders`` (6,) and ``gauges_mm`` (3,) are their stated noise in a record.
     """
     if len(deviations) < FEWEST_VISITS:
         return None

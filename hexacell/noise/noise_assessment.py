@@ -72,8 +72,7 @@ def assess_noise(plan: Plan, readings: NoiseReadings) -> measured_noise.Measured
         windows: stated.with_devices(sigma[3:].tolist(), sigma[:3].tolist())
         for windows, sigma in {windows: assessment.of_records(windows) for windows in WINDOWS}.items()
     }
-    forecaster = AveragingForecaster(plan)
-    forecasts = forecaster.forecasts(noise)
+    forecasts = averaging_forecasts(plan, noise)
     windows = _windows_taken(plan, forecasts)
     x, y, z, *encoders = assessment.instruments(windows)
     return measured_noise.MeasuredNoise(
@@ -82,7 +81,7 @@ def assess_noise(plan: Plan, readings: NoiseReadings) -> measured_noise.Measured
         approaches=assessment.scatter,
         windows=windows,
         forecasts=forecasts,
-        encoders_part_mm=forecaster.encoders_part(noise[1]),
+        encoders_part_mm=encoders_part(plan, noise[1]),
     )
 
 
@@ -196,42 +195,37 @@ class _NoiseAssessment:
             )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class AveragingForecaster:
-    """Forecasts what it gains to take the mean of several settled windows for a record of a plan."""
+def averaging_forecasts(
+    plan: Plan, noise: Mapping[int, Noise]
+) -> tuple[measured_noise.AveragingForecast, ...]:
+    """Errors by the noise of records of some windows each; empty where no accuracy is predicted."""
+    records = sum(plan.forecaster.planned(CampaignState()).values())
+    found = []
+    for windows, one in noise.items():
+        minutes = records * measured_noise.averaging_seconds(plan.settings, windows) / 60.0
+        if (error := end_error(plan, one, windows)) is not None:
+            forecast = measured_noise.AveragingForecast(windows=windows, error_mm=error, minutes=minutes)
+            found.append(forecast)
+    return tuple(found)
 
-    plan: Plan
 
-    def forecasts(self, noise: Mapping[int, Noise]) -> tuple[measured_noise.AveragingForecast, ...]:
-        """Errors by the noise of records of some windows each; empty where no accuracy is predicted."""
-        errors = {windows: self.end_error(one, windows) for windows, one in noise.items()}
-        records = sum(self.plan.forecaster.planned(CampaignState()).values())
-        minutes = {
-            windows: records * measured_noise.averaging_seconds(self.plan.settings, windows) / 60.0
-            for windows in noise
-        }
-        return tuple(
-            measured_noise.AveragingForecast(windows=windows, error_mm=error, minutes=minutes[windows])
-            for windows, error in errors.items()
-            if error is not None
-        )
+def encoders_part(plan: Plan, noise: Noise) -> float | None:
+    """What the noise of the encoders contributes to the predicted error, mm."""
+    perfect = replace(noise, encoder=PERFECT * noise.encoder)
+    error, other = end_error(plan, noise), end_error(plan, perfect)
+    return None if error is None or other is None else max(error**2 - other**2, 0.0) ** 0.5
 
-    def encoders_part(self, noise: Noise) -> float | None:
-        """What the noise of the encoders contributes to the predicted error, mm."""
-        perfect = replace(noise, encoder=PERFECT * noise.encoder)
-        error, other = self.end_error(noise), self.end_error(perfect)
-        return None if error is None or other is None else max(error**2 - other**2, 0.0) ** 0.5
 
-    def end_error(self, noise: Noise, windows: int = 1) -> float | None:
-        """The predicted error at the worst task pose once all is measured, one standard deviation, mm.
+def end_error(plan: Plan, noise: Noise, windows: int = 1) -> float | None:
+    """The predicted error at the worst task pose once all is measured, one standard deviation, mm.
 
-        Records of more windows take longer: a budget in minutes pays for fewer.
-        """
-        budget = Budget.of(measured_noise.with_windows(self.plan.settings, windows))
-        forecaster = replace(self.plan.forecaster, budget=budget)
-        belief = replace(self.plan.robot.belief(), noise=noise)
-        after = forecaster.predicted_belief(belief, CampaignState())
-        return forecaster.worst_error(CampaignState(), after)
+    Records of more windows take longer: a budget in minutes pays for fewer.
+    """
+    budget = Budget.of(measured_noise.with_windows(plan.settings, windows))
+    forecaster = replace(plan.forecaster, budget=budget)
+    belief = replace(plan.robot.belief(), noise=noise)
+    after = forecaster.predicted_belief(belief, CampaignState())
+    return forecaster.worst_error(CampaignState(), after)
 
 
 def mean_of_independent(noise: Noise, windows: int) -> Noise:

@@ -51,16 +51,10 @@ class Reversal(Frozen):
 def reversal_of(
     visits: Sequence[tuple[ReferenceChange, Array]], known: Array, sigma: Array, unit: JointUnit
 ) -> Reversal | None:
-    """Reversal and repeatability; those of the ball are at the pose of the first visits.
+    """Reversal and repeatability, those of the ball at the pose of the first visits; None of too few.
 
-    Args:
-        visits: pairs of them: how what is shown differs, and the directions of arrival (6,).
-        known: what is known beforehand of the reversal value of each joint (6,).
-        sigma: one standard deviation of that (6,).
-        unit: of the joint variables.
-
-    Returns:
-        None of too few visits.
+    Of each pair of ``visits``: how what is shown differs, and how the directions of arrival (6,) do.
+    Beforehand each joint's reversal value (6,) is ``known``, with one standard deviation ``sigma`` (6,).
     """
     if len(visits) < FEWEST_CHANGES:
         return None

@@ -41,15 +41,9 @@ class Worsening(Frozen):
 
 
 def worsening_of(changes: Sequence[ReferenceChange], ends: int, noise: Noise) -> Worsening | None:
-    """What got worse, if something did.
+    """What got worse; None where chance explains it, or too little was read.
 
-    Args:
-        changes: in the order in which they were read; the last ones are the ``ends`` of sets.
-        ends: their number.
-        noise: of a record, that of the drift of the gauges included.
-
-    Returns:
-        None where chance explains it, or too little was read.
+    The ``changes`` are in the order in which they were read; so many of the last are the ``ends`` of sets.
     """
     later = ends - ends // 2
     if ends - later < FEWEST:

@@ -110,7 +110,7 @@ class IdentificationResult(Frozen):
             termination=found.termination,
             iterations=found.solution.iterations,
             records=found.records,
-            points=found.points,
+            points=found.problem.points,
             residual_rms_mm=found.residual_rms_mm,
             chi2=found.goodness.chi2,
             dof=found.dof,

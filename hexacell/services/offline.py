@@ -147,16 +147,17 @@ def try_plan(cell: Cell) -> PlanTrial:
         FileError: see :func:`plan_of`.
     """
     from hexacell.dry_run.campaign import dry_run  # noqa: PLC0415 - takes seconds anyway
-    from hexacell.noise.noise_assessment import WINDOWS, AveragingForecaster, mean_of_independent  # noqa: PLC0415
+    from hexacell.noise import noise_assessment  # noqa: PLC0415 - likewise
 
     plan = plan_of(cell)
-    averaging, noise = AveragingForecaster(plan), plan.robot.noise
+    windows, noise = noise_assessment.WINDOWS, plan.robot.noise
+    averaged = {number: noise_assessment.mean_of_independent(noise, number) for number in windows}
     return PlanTrial(
         dry_run(plan),
         unreachable_share(plan),
         cell.settings.identification.target_mm,
-        averaging.forecasts({windows: mean_of_independent(noise, windows) for windows in WINDOWS}),
-        averaging.encoders_part(noise),
+        noise_assessment.averaging_forecasts(plan, averaged),
+        noise_assessment.encoders_part(plan, noise),
     )
 
 

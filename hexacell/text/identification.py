@@ -37,8 +37,8 @@ def identification_report(assessed: Assessment) -> str:
         accuracy_table(assessed),
         budget_table(budget, is_evident=assessed.is_evident),
         wrapped(
-            f"{len(found.free)} parameters from {found.records} records at {found.points} points; the "
-            f"solver ended because {found.termination.value} ({found.solution.iterations} iterations)."
+            f"{len(found.free)} parameters from {found.records} records at {found.problem.points} points; "
+            f"the solver ended because {found.termination.value} ({found.solution.iterations} iterations)."
         ),
         _identified(assessed),
         "\n".join(drawing_table(assessed.zeros or found, assessed.drawing)),

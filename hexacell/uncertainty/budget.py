@@ -111,7 +111,7 @@ class UncertaintyBudget:
             factor, of_terms = np.split(both, [len(covariance)])
             by_terms = propagation.by_terms(terms)
             noise = propagation.jacobian @ factor + by_terms @ of_terms
-            known = known + by_terms @ terms.left_by(propagation.corrections)
+            known = known + by_terms @ terms.left_by(propagation.belief.corrections)
         if scale is not None and by_scale is not None:
             noise = noise + by_scale[..., None] * (scale.by_parameters @ factor)
         significant = VISIBLE_SIGMAS * np.sqrt(2.0 * found.goodness.expected)

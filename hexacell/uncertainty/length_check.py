@@ -61,14 +61,9 @@ class LengthCheck:
         judged: length_records.JudgedGeometry,
         effects: Iterable[Effect] = (),
     ) -> "LengthCheck":
-        """The check of a geometry.
+        """The check of the geometry that the records have, of which is known what is ``judged``.
 
-        Args:
-            records: n of them, with the geometry that is judged.
-            standard: the fixture.
-            noise: of the readings, and of the gauges' alignment.
-            judged: what is known of that geometry.
-            effects: that the machine may have; the scale common to all encoders does not count.
+        Of the ``effects`` that the machine may have the scale common to all encoders does not count.
         """
         placement = records.placement
         mechanism, geometry = placement.mechanism, placement.geometry

@@ -13,7 +13,7 @@ chi-square is ``e^T M e``, with M the weights less what stations and parameters 
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -27,7 +27,6 @@ from hexacell.identification.solver.measurement_model import NuisanceElimination
 from hexacell.identification.solver.result import Identification
 from hexacell.identification.solver.term_estimates import TermEstimates
 from hexacell.identification.terms.term import ErrorsOfSizes, ModelTerm
-from hexacell.kinematics.corrections import NO_CORRECTIONS, Corrections
 from hexacell.kinematics.parameters import LEGS, JointUnit
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -51,51 +50,40 @@ class TaskColumns:
 
 @dataclass(frozen=True, eq=False)
 class Propagation:
-    """The linear maps at one identification, for one task.
+    """The linear maps at one identification, whose estimate reaches all poses of task and workspace.
 
     Attributes:
+        earlier: the :meth:`parameter_columns` of the estimate that was the prior, by the names of the
+            effects; empty where the prior is a drawing.
         zeros: these alone are identified; None where all parameters are.
-        workspace: poses over which the frames are fitted.
-        jacobian: (t, 6, p) of the errors at the task poses by the free parameters.
-        earlier: errors (p, k) of the estimate that was the prior, by one unit of each cause, by the names
-            of the effects; empty where the prior is a drawing.
-        corrections: what the controller adds for the terms of the model.
     """
 
     found: Identification
-    zeros: IdentifiedZeros | None
-    task: Placement
-    workspace: Placement
-    jacobian: Array
-    frames: FrameFit
-    earlier: Mapping[str, Array]
-    corrections: Corrections = NO_CORRECTIONS
+    belief: RobotBelief
+    task_poses: PoseBatch
+    workspace_poses: PoseBatch
+    earlier: Mapping[str, Array] = field(default_factory=dict)
+    zeros: IdentifiedZeros | None = None
 
-    @classmethod
-    def of(
-        cls,
-        found: Identification,
-        belief: RobotBelief,
-        *,
-        task: PoseBatch,
-        workspace: PoseBatch,
-        earlier: Mapping[str, Array] | None = None,
-        zeros: IdentifiedZeros | None = None,
-    ) -> "Propagation":
-        """Linearize at an identification whose estimate reaches all task and workspace poses.
+    @cached_property
+    def task(self) -> Placement:
+        """The robot at the task poses."""
+        return pose_accuracy.placement_of(self.belief, self.task_poses)
 
-        ``earlier`` has the :meth:`parameter_columns` of the estimate that was the prior of this one.
-        """
-        return cls(
-            found=found,
-            zeros=zeros,
-            task=pose_accuracy.placement_of(belief, task),
-            workspace=pose_accuracy.placement_of(belief, workspace),
-            jacobian=pose_accuracy.error_jacobian(belief, task, workspace),
-            frames=pose_accuracy.teachable_frames(belief, workspace),
-            earlier=earlier or {},
-            corrections=belief.corrections,
-        )
+    @cached_property
+    def workspace(self) -> Placement:
+        """The robot at the poses over which the frames are fitted."""
+        return pose_accuracy.placement_of(self.belief, self.workspace_poses)
+
+    @cached_property
+    def frames(self) -> FrameFit:
+        """The frames that are fitted."""
+        return pose_accuracy.teachable_frames(self.belief, self.workspace_poses)
+
+    @cached_property
+    def jacobian(self) -> Array:
+        """(t, 6, p) of the errors at the task poses by the free parameters."""
+        return pose_accuracy.error_jacobian(self.belief, self.task_poses, self.workspace_poses)
 
     @cached_property
     def _elimination(self) -> NuisanceElimination:
@@ -162,7 +150,7 @@ class Propagation:
         """
         if terms is None:
             return
-        left = terms.left_by(self.corrections)
+        left = terms.left_by(self.belief.corrections)
         for row, term in enumerate(terms.terms):
             if term.on_either_side is not None:
                 rows = slice(row * LEGS, (row + 1) * LEGS)

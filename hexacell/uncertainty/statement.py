@@ -44,15 +44,6 @@ class TaskErrors:
     effects: Array
     measured: tuple[tuple[Array, float], ...] = ()
 
-    @classmethod
-    def of(cls, jacobian: Array, difference: Array, covariance: Array, systematic: Array) -> "TaskErrors":
-        """The errors, by a jacobian (n, 6, p), of a geometry that differs by (p,) from the estimate.
-
-        ``covariance`` (p, p) is that of the estimate, and ``systematic`` (n, 6, k) are effects beside it.
-        """
-        by_noise = jacobian @ covariance_factor(covariance)
-        return cls(jacobian @ difference, np.concatenate([by_noise, systematic], axis=-1))
-
     @cached_property
     def position(self) -> LargestError:
         """Largest position error, mm."""

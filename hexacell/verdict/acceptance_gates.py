@@ -36,14 +36,7 @@ class AcceptanceGate(Frozen):
 def gates_of_run(
     settings: CellSettings, robot: Robot, result: IdentificationResult, expired: Sequence[str] | None = None
 ) -> tuple[AcceptanceGate, ...]:
-    """The gates of a run, by its result.
-
-    Args:
-        settings: of the cell.
-        robot: with the controller's geometry as it was before.
-        result: of the identification.
-        expired: as in :func:`gates`.
-    """
+    """The gates of a run, by its result; the ``robot`` has the controller's geometry as it was before."""
     identified = result.estimate(robot.mechanism.parameters)
     return gates(
         identified,
@@ -66,17 +59,12 @@ def gates(
     expired: Sequence[str] | None = None,
     impossible: Sequence[str] = (),
 ) -> tuple[AcceptanceGate, ...]:
-    """All gates of an identification.
+    """All gates of an identification, in the mechanism's frame convention.
 
-    Args:
-        identified: the geometry, in the mechanism's frame convention.
-        violations: of the drawing's tolerances.
-        residuals: the chi-square test of the residuals.
-        change_mm: the largest change of a parameter of the controller's, in the best choice of frames:
-            other frames are no other robot. Without a limit nothing is written.
-        largest_change_mm: what may change without a person.
-        expired: instruments whose certificate had expired when the run began; None without certificates.
-        impossible: coefficients of what is not geometry that no machine has (:func:`impossible_terms`).
+    ``change_mm`` is the largest change of a parameter of the controller's, in the best choice of frames:
+    other frames are no other robot. ``largest_change_mm`` may change without a person; without this limit
+    nothing is written. ``expired`` are instruments whose certificate had expired when the run began; None
+    without certificates. ``impossible`` is what no machine has (:func:`impossible_terms`).
     """
     names = ", ".join(f"{one.name} ({shown(one.change, '+', one.unit)})" for one in violations)
     checked = [

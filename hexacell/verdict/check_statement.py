@@ -14,7 +14,7 @@ from hexacell.cell.measuring import ErrorLimits
 from hexacell.design.criteria import add_information
 from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effects import Effect
-from hexacell.uncertainty.statement import TaskErrors
+from hexacell.uncertainty.statement import TaskErrors, covariance_factor
 from hexacell.verdict.decision import Verdict, decide_both
 
 MOST_FURTHER_RECORDS = 200
@@ -39,11 +39,6 @@ class CheckStatement:
     is_consistent: bool
     records: int
     further_records: int | None = None
-
-    @property
-    def is_decided(self) -> bool:
-        """Whether the records are enough for a verdict that a check ends with."""
-        return self.verdict.is_final
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,8 +86,9 @@ class ErrorEstimate:
     @property
     def errors(self) -> TaskErrors:
         """The errors with their uncertainty."""
-        unknown = TaskErrors.of(self.jacobian, self.difference, self.covariance, self.systematic)
-        return replace(unknown, estimated=unknown.estimated + self.known)
+        by_noise = self.jacobian @ covariance_factor(self.covariance)
+        estimated = self.jacobian @ self.difference + self.known
+        return TaskErrors(estimated, np.concatenate([by_noise, self.systematic], axis=-1))
 
     def after(self, information: Array) -> ErrorEstimate:
         """The errors after records that add information (p, p) and confirm the estimate."""

@@ -22,10 +22,8 @@ SHARP = 0.1
 def correction_test(robot: Robot, records: MeasurementSet) -> ModelTest | None:
     """The test of the corrections of a robot that commands now, by records taken under them.
 
-    A joint that stands beside its command at all poses alike is no evidence.
-
-    Returns:
-        None where nothing is corrected, or the records do not tell.
+    A joint that stands beside its command at all poses alike is no evidence. None where nothing is
+    corrected, or the records do not tell.
     """
     corrections, states = robot.corrections, (robot.controller, robot.branch)
     if corrections.are_none or not len(records):

@@ -45,11 +45,7 @@ def verify_with_scatter(
 ) -> Verification:
     """Verify a result whose records may show scatter by chance.
 
-    Args:
-        settings: those of the cell.
-        result: what is verified.
-        beyond_chance: the same with that scatter alone which is beyond chance.
-        held_out: what was measured at the held-out poses.
+    ``beyond_chance`` gives the same with that scatter alone which is beyond chance.
 
     Raises:
         IdentifiabilityError: as :func:`.verify` does.

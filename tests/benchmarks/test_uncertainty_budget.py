@@ -58,7 +58,7 @@ def propagation_of(table_one, settings: CellSettings) -> Propagation:
     found = identify(robot.problem(campaign.measurements), find_outliers=False)
     belief = robot.belief(found)
     reached = Task.of(settings, robot, belief).reachable(belief)
-    return Propagation.of(found, belief, task=reached.poses, workspace=reached.workspace)
+    return Propagation(found, belief, reached.poses, reached.workspace)
 
 
 def through_drawn_stops(propagation: Propagation, truth: Geometry, size_mm: float) -> float:

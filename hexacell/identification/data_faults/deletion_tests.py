@@ -11,7 +11,7 @@ import numpy as np
 
 from hexacell.distributions import chi_square_limit
 from hexacell.identification.data_faults.hypotheses import GAUGE_FAULTS
-from hexacell.identification.data_faults.outlier_statistics import OutlierStatistics, model_at, row_of
+from hexacell.identification.data_faults.outlier_statistics import OutlierStatistics, model_at
 from hexacell.identification.problem.commanded_poses import ACCEPTED_MM
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.result import GAUGES, DataFaultKind, Identification
@@ -83,7 +83,7 @@ def _deletion_test(problem: Problem, fit: Identification, record: RecordId) -> D
     leg = _inconsistent_leg(problem, record)
     if model is None or record not in model.problem.record_ids:
         return DeletionTest(record, DataFaultKind.MISMATCHED_JOINTS if leg else DataFaultKind.SINGULAR, leg)
-    row, statistics = row_of(model.problem, record), OutlierStatistics.of(model)
+    row, statistics = model.problem.record_ids.index(record), OutlierStatistics.of(model)
     weights, gauges = model.weights[row], model.problem.gauges
     information = gauges.T @ weights @ model.residual_covariance[row] @ weights @ gauges
     offset = -np.linalg.pinv(information, hermitian=True) @ (gauges.T @ model.scores[row])
@@ -101,7 +101,7 @@ def _inconsistent_leg(problem: Problem, record: RecordId) -> tuple[int, float] |
     over the other records of the point. They change little between the poses of a point, whatever
     geometry the controller had.
     """
-    row = row_of(problem, record)
+    row = problem.record_ids.index(record)
     misfit = problem.joints - problem.commands.joints
     is_other = (problem.labels[:, 0] == record[0]) & (np.arange(problem.records) != row)
     known = misfit[is_other & np.isfinite(misfit).all(axis=-1)]

@@ -24,7 +24,7 @@ from itertools import chain, zip_longest
 import numpy as np
 
 from hexacell.distributions import chi_square_limit
-from hexacell.identification.data_faults.outlier_statistics import OutlierStatistics, model_at, row_of
+from hexacell.identification.data_faults.outlier_statistics import OutlierStatistics, model_at
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.linear_model import LinearizedModel
@@ -100,7 +100,7 @@ class ZeroShiftHypothesis(FaultHypothesis):
 
     def rows(self, problem: Problem) -> Mask:
         """The records (n,) after the shift."""
-        first = row_of(problem, (self.point, self.orientation))
+        first = problem.record_ids.index((self.point, self.orientation))
         return np.asarray((problem.labels[:, 0] == self.point) & (np.arange(problem.records) >= first))
 
     def corrected(self, problem: Problem) -> Problem:

@@ -30,11 +30,6 @@ SCATTER_OF_MEDIAN = 1.12
 """Relative standard deviation of the median of n such values, times the square root of n."""
 
 
-def row_of(problem: Problem, record: RecordId) -> int:
-    """The row of a record."""
-    return int(np.flatnonzero((problem.labels == record).all(axis=1))[0])
-
-
 def model_at(
     problem: Problem, free: Array, active_prior: Array, among: Collection[RecordId] | None = None
 ) -> LinearizedModel | None:

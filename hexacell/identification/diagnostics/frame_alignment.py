@@ -136,12 +136,9 @@ def choose_frames(
 ) -> tuple[Geometry, PoseErrors]:
     """The ``new`` geometry, in the frame convention, in the frames in which n taught poses move least.
 
-    The poses are in the frames of the geometry with which they were ``taught``. If both geometries reach no
-    pose, these frames are kept, as the mechanism's convention has them.
-
-    Returns:
-        The geometry in these frames, and how far the poses that both geometries reach move nevertheless, at
-        equal joint variables.
+    And how far those that both geometries reach move nevertheless, at equal joint variables. The poses are
+    in the frames of the geometry with which they were ``taught``. If both geometries reach no pose, these
+    frames are kept, as the mechanism's convention has them.
     """
     normalized, convention = mechanism.normalize_frames(taught)
     robot = CommandedRobot(mechanism, branch, commanding=normalized, actual=new)

@@ -20,16 +20,10 @@ STEPS = 5
 def largest_change(
     mechanism: Mechanism, before: Geometry, geometry: Geometry, tolerances: Tolerances
 ) -> float:
-    """The largest change of a parameter from one geometry to another, in the best choice of frames.
+    """The largest change of a parameter, mm, or mrad of an angle, in the best choice of frames.
 
-    Args:
-        mechanism: of both.
-        before: in its own frames.
-        geometry: in the mechanism's frame convention.
-        tolerances: what changes of different parameters are compared by.
-
-    Returns:
-        mm, or mrad of an angle; infinite where the geometry is not a number.
+    From a geometry ``before`` in its own frames to one in the mechanism's convention; infinite where that
+    is not a number. Changes of different parameters are compared by the ``tolerances``.
     """
     if not np.isfinite(geometry.vector).all():
         return float("inf")

@@ -22,14 +22,9 @@ from hexacell.kinematics.rotations import Mask
 
 
 def update(found: Identification, further: Problem) -> Identification:
-    """Estimate by the records of an identification and further ones.
+    """Estimate by the records of an identification and further ones that have a pose under it.
 
-    Args:
-        found: the identification; its prior, where it was not released, counts again.
-        further: records at other points, with the same prior.
-
-    Returns:
-        The estimate by all records that have a pose under it.
+    These are at other points. The prior, where it was not released, counts again.
 
     Raises:
         IdentifiabilityError: no geometry fits any of the further records; they would prove nothing.

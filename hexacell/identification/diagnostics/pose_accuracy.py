@@ -50,15 +50,9 @@ class Accuracy:
 
 
 def predicted_accuracy(belief: RobotBelief, *, task: PoseBatch, workspace: PoseBatch) -> Accuracy | None:
-    """Predict the accuracy at task poses.
+    """Predict the accuracy at task poses, with frames fitted over those of the workspace.
 
-    Args:
-        belief: the estimate beside the geometry that the controller commands with.
-        task: t poses, in the mechanism's frame convention.
-        workspace: poses over which base and platform frames are fitted.
-
-    Returns:
-        Errors in mm and rad; None if no task pose or no workspace pose is reachable.
+    All are in the mechanism's frame convention. None if none of the task or of the workspace is reachable.
     """
     reached, task_reachable = _reached(belief, task)
     reached_workspace, workspace_reachable = _reached(belief, workspace)
@@ -83,15 +77,9 @@ def predicted_accuracy(belief: RobotBelief, *, task: PoseBatch, workspace: PoseB
 
 
 def error_jacobian(belief: RobotBelief, task: PoseBatch, workspace: PoseBatch) -> Array:
-    """Derivatives of the errors at task poses by the free parameters of the estimate.
+    """Derivatives (n, 6, p), mm and rad by mm, of the errors at n task poses by the free parameters.
 
-    Args:
-        belief: the estimate, with p free parameters.
-        task: n poses that the estimated robot reaches.
-        workspace: poses that it reaches, over which the frames are fitted.
-
-    Returns:
-        (n, 6, p), mm and rad by mm.
+    The estimated robot reaches all of them, and all of the workspace, over which the frames are fitted.
     """
     poses = PoseBatch.joined([task, workspace])
     joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)

@@ -101,12 +101,8 @@ def tolerance_violations(
     fitter = ToleranceFitter(mechanism, drawing, tolerances, found.geometry, found.covariance)
     if not np.isfinite(found.geometry.vector).all():
         return _violations(fitter, frames, np.full(len(drawing.vector), np.inf))
-    return _named(fitter, fitter.fit(frames))
-
-
-def _named(fitter: ToleranceFitter, fit: ToleranceFit) -> tuple[ToleranceViolation, ...]:
-    """The violations of joints without whose tolerances there is a robot; ``fit`` is within all of them."""
-    faults, others = list[Joint](), list[Joint]()
+    # Joints without whose tolerances there is a robot, from the one that is within all of them.
+    fit, faults, others = fitter.fit(frames), list[Joint](), list[Joint]()
     while fit.distance > fit.limit:  # no robot within the tolerances explains the identified geometry
         pressing = {joint: _rows(fitter, [*faults, joint]) for joint in _pressing(fitter, fit)}
         tried = {joint: fitter.fit(fit.frames, rows) for joint, rows in pressing.items()}

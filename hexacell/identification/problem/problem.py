@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,9 @@ NO_TRAVEL_MM: Deviation = (np.inf, np.inf, np.inf)
 
 MAX_COUNTED_POSES = 1000
 """Number of records above which all poses count as different."""
+
+OF_EACH_RECORD = ("joints", "deviations", "times_s", "directions", "warmer", "has_start_pose", "labels")
+"""Arrays of a problem that have a row for each record."""
 
 Values = TypeVar("Values", Array, Mask)
 
@@ -217,16 +220,10 @@ class Problem:
         kept = np.flatnonzero(rows)
         return replace(
             self,
-            joints=self.joints[kept],
-            deviations=self.deviations[kept],
-            times_s=self.times_s[kept],
-            directions=self.directions[kept],
-            warmer=self.warmer[kept],
+            **{name: getattr(self, name)[kept] for name in OF_EACH_RECORD},
             first_rows=first_rows_of(self.labels[kept, 0]),
             commands=self.commands[kept],
             start=self.start[kept],
-            has_start_pose=self.has_start_pose[kept],
-            labels=self.labels[kept],
             terms=self.terms and self.terms[kept],
         )
 
@@ -235,23 +232,18 @@ class Problem:
 
         Both have the same terms.
         """
-        labels = np.concatenate([self.labels, other.labels])
-        order = np.argsort(labels[:, 0], kind="stable")
-        terms = self.terms
+        pairs = {name: (getattr(self, name), getattr(other, name)) for name in OF_EACH_RECORD}
+        both: dict[str, Any] = {name: np.concatenate(pair) for name, pair in pairs.items()}
+        points = both["labels"][:, 0]
+        order, terms = np.argsort(points, kind="stable"), self.terms
         if terms is not None and other.terms is not None:
             terms = terms.joined(other.terms)[order]
         return replace(
             self,
-            joints=np.concatenate([self.joints, other.joints])[order],
-            deviations=np.concatenate([self.deviations, other.deviations])[order],
-            times_s=np.concatenate([self.times_s, other.times_s])[order],
-            directions=np.concatenate([self.directions, other.directions])[order],
-            warmer=np.concatenate([self.warmer, other.warmer])[order],
-            first_rows=first_rows_of(labels[order, 0]),
+            **{name: values[order] for name, values in both.items()},
+            first_rows=first_rows_of(points[order]),
             commands=self.commands.joined(other.commands)[order],
             start=PoseBatch.joined([self.start, other.start])[order],
-            has_start_pose=np.concatenate([self.has_start_pose, other.has_start_pose])[order],
-            labels=labels[order],
             terms=terms,
         )
 

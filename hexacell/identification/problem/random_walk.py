@@ -39,16 +39,10 @@ TRIAL = 4
 def walk_columns(
     first_rows: NDArray[np.intp], records: int, walk: GaugeWalk, times_s: Array | None = None
 ) -> Array:
-    """What one standard deviation of each increment does to each record.
+    """What one standard deviation of each increment does to each of n records (n, 3, 3 (n - m)), mm.
 
-    Args:
-        first_rows: (m,) row at which each point begins, of records in the order in which they were taken.
-        records: their number n.
-        walk: of the gauges' zero.
-        times_s: (n,) when records were taken; None, or NaN where one is not known: steps are counted.
-
-    Returns:
-        (n, 3, 3 (n - m)), mm.
+    Each of m points begins at one of ``first_rows`` (m,), its records in the order in which they were taken
+    at ``times_s`` (n,). Without these, or where one is NaN, steps are counted.
     """
     rows = np.arange(records)
     later = np.setdiff1d(rows, first_rows)

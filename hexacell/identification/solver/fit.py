@@ -105,20 +105,15 @@ FINE = SolverOptions(SMALL_DAMPING, FINAL_STEP_MM)
 def fit_regularized(
     problem: Problem, options: SolverOptions = COARSE, start: Array | None = None
 ) -> Identification:
-    """Fit the records with the prior, and release it where the data determine the parameters.
+    """Fit the usable records with the prior, and release it where the data determine the parameters.
 
-    Args:
-        problem: the records, and the parameters and poses at which the solver starts.
-        options: for the first of the two solutions.
-        start: free parameters (p,), mm, at which the solver starts instead.
-
-    Returns:
-        The fit of the records that could be used.
+    The ``options`` are for the first of the two solutions, which starts at free parameters ``start`` (p,),
+    mm, if not at those of the problem.
     """
     kept, first = solve_around_singularities(problem, problem.prior.precision, options, start)
     # Residuals below the stated noise justify more information than stated: without it, a prior would bias
     # records with hardly any noise.
-    redundancy, correction = kept.coordinates - len(first.free), 1.0
+    redundancy, correction = kept.coordinates - len(first.information), 1.0
     if redundancy >= LEAST_REDUNDANCY:
         correction = max(1.0, redundancy / max(first.chi2, SMALLEST_CHI2))
     # The prior's precision stays in the directions that the data do not determine.
@@ -132,16 +127,10 @@ def fit_regularized(
 def solve_around_singularities(
     problem: Problem, precision: Array, options: SolverOptions, start: Array | None = None
 ) -> tuple[Problem, Solution]:
-    """Minimize the cost without records that come next to a singularity.
+    """Minimize the cost without records that come next to a singularity: the others, and their solution.
 
-    Args:
-        problem: n records, some of which may have no start pose.
-        precision: (p, p) of the prior, 1/mm^2.
-        options: of the solver.
-        start: free parameters (p,), mm, if not those of the problem.
-
-    Returns:
-        The records that were used, and their solution.
+    The ``precision`` (p, p), 1/mm^2, is that of the prior; the solver begins at free parameters ``start``
+    (p,), mm, if not at those of the problem.
     """
     if start is not None:
         problem = problem.started_at(start)
@@ -153,7 +142,7 @@ def solve_around_singularities(
         solution = solve(kept, precision, predict(kept, free, poses), options)
         if search == options.searches:
             break
-        free, poses = solution.free, solution.prediction.poses
+        free, poses = solution.prediction.free, solution.prediction.poses
         if solution.termination is Termination.SINGULAR and not solution.singular.all():
             used[np.flatnonzero(used)[solution.singular]] = False
             poses = poses[~solution.singular]
@@ -182,16 +171,9 @@ def _restorable(problem: Problem, geometry: Geometry, aside: Mask) -> tuple[Mask
 
 
 def solve(problem: Problem, precision: Array, start: Prediction, options: SolverOptions) -> Solution:
-    """Minimize the cost from some free parameters and the poses that close their geometry.
+    """Minimize the cost, from the model of all records at some free parameters.
 
-    Args:
-        problem: the n records and the prior's centre.
-        precision: (p, p) of the prior, 1/mm^2; zero for no prior.
-        start: the model of the records at these parameters.
-        options: of the solver.
-
-    Returns:
-        The last iterate, and why the iteration ended there.
+    The ``precision`` (p, p), 1/mm^2, is that of the prior; zero for no prior.
     """
     now = _Iterate.at(problem, precision, start, options.damping)
     iterations, ended = 0, None
@@ -202,8 +184,8 @@ def solve(problem: Problem, precision: Array, start: Prediction, options: Solver
             ended = following
         else:
             now = following
-    information, chi2 = now.linear.information(), now.linear.cost()
-    return Solution(now.prediction, information, chi2, iterations, ended, now.singular)
+    information, values = now.linear.information(), now.linear.values
+    return Solution(now.prediction, information, float(values @ values), iterations, ended, now.singular)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -149,10 +149,6 @@ class ReducedSystem:
         """Half the gradient of the cost by the free parameters (p,)."""
         return self.rows.T @ self.values
 
-    def cost(self) -> float:
-        """Sum of squares: the chi-square of the residuals."""
-        return float(self.values @ self.values)
-
 
 class NuisanceElimination:
     """The unknowns c, w, k, of drift and terms at their best values, for weights (n, 3, 3), 1/mm^2."""

@@ -102,11 +102,6 @@ class Solution:
     termination: Termination
     singular: Mask
 
-    @property
-    def free(self) -> Array:
-        """Free parameters (p,), mm."""
-        return self.prediction.free
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GeometryEstimate:
@@ -151,7 +146,7 @@ class Identification:
     @property
     def free(self) -> Array:
         """The free parameters (p,), mm."""
-        return self.solution.free
+        return self.prediction.free
 
     @cached_property
     def free_covariance(self) -> Array:
@@ -206,11 +201,6 @@ class Identification:
     def records(self) -> int:
         """How many records were used."""
         return self.problem.records
-
-    @property
-    def points(self) -> int:
-        """How many points have records."""
-        return self.problem.points
 
     @property
     def residual_rms_mm(self) -> float:

@@ -32,13 +32,9 @@ class TermEstimates:
     def at(
         cls, problem: Problem, taken: TakenTerms, prediction: Prediction, covariance: Array
     ) -> "TermEstimates":
-        """The best coefficients at a minimum of the cost.
+        """The best coefficients of the terms ``taken`` at a minimum of the cost.
 
-        Args:
-            problem: the records.
-            taken: the terms that they have.
-            prediction: of the records at the minimum.
-            covariance: of the free parameters there (p, p), mm^2.
+        The ``covariance`` (p, p), mm^2, is that of the free parameters there.
         """
         elimination = NuisanceElimination(problem, prediction.weights)
         causes = taken.columns.shape[-1]

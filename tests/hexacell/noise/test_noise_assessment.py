@@ -13,9 +13,10 @@ from hexacell.kinematics.sensitivity import free_sensitivity
 from hexacell.noise.approach_scatter import ScatterSource
 from hexacell.noise.measured_noise import AveragingForecast, with_measured_noise
 from hexacell.noise.noise_assessment import (
-    AveragingForecaster,
     NoiseReadings,
     assess_noise,
+    encoders_part,
+    end_error,
     worthwhile_windows,
 )
 from hexacell.robot.model import robot_of
@@ -179,13 +180,12 @@ def test_without_a_series_or_visits_what_is_stated_holds(plan) -> None:
 
 
 def test_the_part_of_the_encoders_and_the_rest_make_the_whole(plan) -> None:
-    forecaster = AveragingForecaster(plan)
     noise = plan.robot.noise
-    part, whole = forecaster.encoders_part(noise), forecaster.end_error(noise)
+    part, whole = encoders_part(plan, noise), end_error(plan, noise)
     assert whole is not None
     assert part is not None
     assert 0.5 * whole < part < whole
-    halved = forecaster.end_error(replace(noise, encoder=0.5 * noise.encoder))
+    halved = end_error(plan, replace(noise, encoder=0.5 * noise.encoder))
     assert halved is not None
     assert halved == pytest.approx(np.sqrt(whole**2 - 0.75 * part**2), rel=0.1)
 

@@ -115,7 +115,7 @@ def test_the_pairwise_minimum_is_the_unweighted_centred_one(noisy, make_problem,
     centred = levenberg_marquardt.solve(unweighted, np.zeros((parameters, parameters)), start, FINE)
     assert centred.termination.converged
     pairwise = problem.mechanism.convention.free_parameters(reference_solvers.gauss_newton(problem))
-    np.testing.assert_allclose(centred.free, pairwise, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(centred.prediction.free, pairwise, rtol=0, atol=1e-6)
 
 
 def test_gauss_newton_reports_that_it_left_the_assembly_mode(visit, make_problem):

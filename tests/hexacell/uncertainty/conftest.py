@@ -70,7 +70,7 @@ class Laboratory:
 
     def propagation(self, found: Identification, earlier: Mapping[str, Array] | None = None) -> Propagation:
         belief = belief_of(found, self.paper.nominal, self.paper.branch)
-        return Propagation.of(found, belief, task=self.task, workspace=self.workspace, earlier=earlier)
+        return Propagation(found, belief, self.task, self.workspace, earlier or {})
 
     def records_of(self, machine: Machine) -> MeasurementSet:
         """Its exact records: the encoders show what they did, the ball is elsewhere."""

@@ -1,6 +1,7 @@
 """The budget has every line, and U is the quantile of the distributions that have a closed form."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,6 +12,9 @@ from hexacell.identification.problem.prior import Noise
 from hexacell.uncertainty import effect_kinds
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.statement import LargestError, TaskErrors
+from hexacell.verdict.check_statement import ErrorEstimate
+
+error_estimate = partial(ErrorEstimate, known=np.zeros(6))
 
 GAUGE_SCALE = 2e-3
 
@@ -34,9 +38,8 @@ EFFECTS = (
 def test_without_effects_it_is_the_noise_alone(exact, propagation, budget_of) -> None:
     budget = budget_of(exact)
     jacobian = propagation.jacobian
-    noise = TaskErrors.of(
-        jacobian, np.zeros(len(exact.free)), exact.free_covariance, np.zeros((len(jacobian), 6, 0))
-    )
+    by_covariance = np.zeros(len(exact.free)), exact.free_covariance
+    noise = error_estimate(jacobian, *by_covariance, np.zeros((len(jacobian), 6, 0))).errors
     assert budget.expanded_mm == pytest.approx(noise.position.expanded)
     assert budget.expanded_deg == pytest.approx(noise.orientation.expanded)
     squares = np.einsum("tap,pq,taq->t", jacobian[:, :3], exact.free_covariance, jacobian[:, :3])
@@ -158,8 +161,8 @@ def test_a_covariance_and_the_same_effects_give_the_same_statement() -> None:
     random = np.random.default_rng(3)
     jacobian, factor = random.standard_normal((4, 6, 5)), random.standard_normal((5, 5))
     difference = random.standard_normal(5)
-    by_covariance = TaskErrors.of(jacobian, difference, factor @ factor.T, np.zeros((4, 6, 0)))
-    by_effects = TaskErrors.of(jacobian, difference, np.zeros((5, 5)), jacobian @ factor)
+    by_covariance = error_estimate(jacobian, difference, factor @ factor.T, np.zeros((4, 6, 0))).errors
+    by_effects = error_estimate(jacobian, difference, np.zeros((5, 5)), jacobian @ factor).errors
     assert by_covariance.position.value == pytest.approx(by_effects.position.value)
     assert by_covariance.position.expanded == pytest.approx(by_effects.position.expanded, rel=0.03)
     assert by_covariance.worst == by_effects.worst

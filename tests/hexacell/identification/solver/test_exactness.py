@@ -31,7 +31,7 @@ def assert_exact(found, true, records):
 def test_the_papers_robot_from_five_points_of_eleven_orientations(paper, visit, make_problem, seed):
     found = identify(make_problem(visit(seed=seed).measured()))
     assert_exact(found, paper.actual, records=55)
-    assert found.points == 5
+    assert found.problem.points == 5
     assert found.dof == 3 * (55 - 5) - 35
 
 

@@ -95,11 +95,7 @@ class Archive:
         return open_engine(self._url, ". The runs are read from their folders")
 
     def documents(self, kind: DocumentKind) -> dict[str, StampedDocument]:
-        """All documents of one kind, by the names of their runs.
-
-        Raises:
-            ArchiveUnavailable: it cannot be read.
-        """
+        """All documents of one kind, by the names of their runs; raises ``ArchiveUnavailable``."""
         query = select(ARCHIVE_TABLE.c.run, ARCHIVE_TABLE.c.stamp, ARCHIVE_TABLE.c.content).where(
             ARCHIVE_TABLE.c.place == self._place, ARCHIVE_TABLE.c.kind == kind.value
         )
@@ -108,11 +104,7 @@ class Archive:
         return {run: StampedDocument(stamp, content) for run, stamp, content in rows}
 
     def store(self, kind: DocumentKind, documents: Mapping[str, StampedDocument]) -> None:
-        """Keep documents, in the place of older ones.
-
-        Raises:
-            ArchiveUnavailable: it cannot be written.
-        """
+        """Keep documents, in the place of older ones; raises ``ArchiveUnavailable``."""
         rows = [
             {"place": self._place, "run": run, "kind": kind.value, "cell": self._cell}
             | {"stamp": one.stamp, "content": one.content}
@@ -128,11 +120,7 @@ class Archive:
             self._transact(lambda connection: connection.execute(upsert, rows))
 
     def forget(self, runs: Sequence[str]) -> None:
-        """Drop everything about runs that are gone.
-
-        Raises:
-            ArchiveUnavailable: it cannot be written.
-        """
+        """Drop everything about runs that are gone; raises ``ArchiveUnavailable``."""
         query = ARCHIVE_TABLE.delete().where(
             ARCHIVE_TABLE.c.place == self._place, ARCHIVE_TABLE.c.run == bindparam("of_run")
         )

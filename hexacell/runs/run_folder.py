@@ -138,11 +138,7 @@ def new_run_in(folder: Path) -> RunFolder:
 
 
 def find_run(cell: Cell, named: str) -> RunFolder:
-    """A run by its folder, or by its name within the cell's runs.
-
-    Raises:
-        UsageError: there is no such run.
-    """
+    """A run by its folder, or by its name within the cell's runs; raises ``UsageError``."""
     for path in (Path(named), runs_folder(cell) / named) if named.strip() else ():
         if RunFolder(path).journal.is_file():
             return RunFolder(path)
@@ -190,11 +186,7 @@ class StartAttempts(Frozen):
 
 
 def read_attempts(folder: RunFolder) -> StartAttempts | None:
-    """The tries that a run folder keeps; None where the run began at once.
-
-    Raises:
-        FileError: they cannot be read.
-    """
+    """The tries that a run folder keeps; None where the run began at once; raises ``FileError``."""
     path = folder.attempts
     if not path.is_file():
         return None
@@ -207,11 +199,7 @@ def read_attempts(folder: RunFolder) -> StartAttempts | None:
 
 
 def note_attempt(folder: RunFolder, mode: str, attempt: StartAttempt) -> None:
-    """Add a try to those that a run folder keeps; the folder is made.
-
-    Raises:
-        FileError: it cannot be written.
-    """
+    """Add a try to those that a run folder keeps; the folder is made; raises ``FileError``."""
     before = read_attempts(folder)
     attempts = StartAttempts(mode=mode, attempts=(*(before.attempts if before else ()), attempt))
     create_folder_durably(folder.path)

@@ -177,11 +177,7 @@ def fleet_cells(url: str) -> tuple[FleetCell, ...]:
 
 
 def fleet_runs(url: str) -> tuple[FleetRun, ...]:
-    """The runs of all cells of an archive, the newest first.
-
-    Raises:
-        ArchiveUnavailable: it cannot be read.
-    """
+    """The runs of all cells of an archive, the newest first; raises ``ArchiveUnavailable``."""
     found = [
         FleetRun(one.cell, one.place.partition(":")[0], one.run, summary)
         for one, summary in _shared(url, DocumentKind.SUMMARY, RunSummary)

@@ -26,11 +26,7 @@ RUN = "demo"
 
 
 def require_simulation(cell: Cell) -> Cell:
-    """Return a cell, once it is certain that it needs no devices.
-
-    Raises:
-        UsageError: it is a real cell.
-    """
+    """Return a cell, once it is certain that it needs no devices; raises ``UsageError``."""
     if cell.settings.simulation is None:
         raise UsageError("there is no [simulation] in it: this is a real cell", subject=cell.path)
     return cell

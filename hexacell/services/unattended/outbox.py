@@ -70,11 +70,7 @@ class NoticeOutbox:
         return tuple(sorted(found, key=lambda one: (one.notice.at, one.notice.id, one.to)))
 
     def drop_old(self, now: datetime) -> int:
-        """Give up what is too old or too much, the oldest first; gives how many.
-
-        Raises:
-            FileError: they cannot be removed.
-        """
+        """Give up what is too old or too much, the oldest first; gives how many; raises ``FileError``."""
         waiting = self.pending()
         kept = [one for one in waiting if one.notice.at > now - LONGEST_KEPT][-MOST_KEPT:]
         for one in waiting:

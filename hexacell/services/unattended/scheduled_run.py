@@ -71,11 +71,7 @@ class ScheduledRun:
 
 
 def time_of_day(text: str) -> tuple[int, int]:
-    """Hour and minute.
-
-    Raises:
-        UsageError: it is no time of day.
-    """
+    """Hour and minute; raises ``UsageError``."""
     if (found := _TIME.fullmatch(text)) is None:
         raise UsageError(f"'{text}' is no time of day", action="Write it as 02:30")
     return int(found[1]), int(found[2])

@@ -68,11 +68,7 @@ class ConfigHistory:
 
 
 def config_history(cell: Cell) -> ConfigHistory:
-    """Every write into the config of a cell that its runs know of.
-
-    Raises:
-        FileError: the records cannot be read.
-    """
+    """Every write into the config of a cell that its runs know of; raises ``FileError``."""
     folder = runs_folder(cell)
     records, damaged = read_records(folder)
     runs: dict[str, _Run] = {}

@@ -5,8 +5,6 @@ with its Results, ResultMetaData, ResultReadyEventType. They are in a namespace 
 types of that specification, its structured data types and its methods among them, are not all here.
 """
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import os
@@ -14,11 +12,13 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import astuple, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Self
 
 from asyncua import ua
+from asyncua.common.node import Node
 from asyncua.crypto import cert_gen
 from asyncua.crypto.permission_rules import User, UserRole
+from asyncua.server.event_generator import EventGenerator
 from asyncua.server.server import Server
 from cryptography import x509
 from cryptography.hazmat.primitives.serialization import Encoding
@@ -30,10 +30,6 @@ from hexacell.cell.passwords import Login, stated_login
 from hexacell.errors import DeviceError, UsageError
 from hexacell.result_server.published_result import SEVERITIES, NewResults, PublishedResult
 from hexacell.storage import atomic_files
-
-if TYPE_CHECKING:
-    from asyncua.common.node import Node
-    from asyncua.server.event_generator import EventGenerator
 
 URI = "urn:hexacell:result-server"
 NAMESPACE = "urn:hexacell:results"
@@ -139,7 +135,7 @@ class ResultNodes:
         self._shown: deque[Node] = deque()
 
     @classmethod
-    async def of(cls, server: Server, cell: str) -> ResultNodes:
+    async def of(cls, server: Server, cell: str) -> Self:
         """Make the nodes of a cell: Objects / its name / ResultManagement / Results."""
         namespace = await server.register_namespace(NAMESPACE)
         event_type = await server.create_custom_event_type(

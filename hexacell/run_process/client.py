@@ -2,11 +2,13 @@
 
 import asyncio
 import os
+import subprocess
 import tempfile
 from asyncio import StreamReader, StreamWriter
 from collections.abc import AsyncIterator, Sequence
 from contextlib import suppress
 from pathlib import Path
+from subprocess import DEVNULL, PIPE
 from typing import BinaryIO, Protocol
 
 from hexacell.errors import ExitCode, FileError, HexacellError
@@ -159,20 +161,11 @@ async def start_host(path: Path, arguments: Sequence[str]) -> HostConnection:
 
 def _spawn(arguments: Sequence[str]) -> None:
     """Start the process and wait until it listens; it is no child of this one then."""
-    answered, answering = os.pipe()
-    with tempfile.TemporaryFile() as errors, os.fdopen(answered, "rb") as answers:
-        streams = [  # nothing to read, the answer on stdout, and messages of the interpreter in a file
-            (os.POSIX_SPAWN_OPEN, 0, os.devnull, os.O_RDONLY, 0),
-            (os.POSIX_SPAWN_DUP2, answering, 1),
-            (os.POSIX_SPAWN_DUP2, errors.fileno(), 2),
-        ]
-        command = python_command("hexacell", "host", *arguments)
-        try:
-            process = os.posix_spawn(command[0], command, os.environ, file_actions=streams, setsid=True)
-        finally:
-            os.close(answering)
-        os.waitpid(process, 0)
-        answer = answers.readline()
+    command = python_command("hexacell", "host", *arguments)
+    with tempfile.TemporaryFile() as errors:
+        answer = subprocess.run(  # noqa: S603 - this program; its stdout ends with the answer
+            command, stdin=DEVNULL, stdout=PIPE, stderr=errors, start_new_session=True, check=False
+        ).stdout
         if answer != READY:
             raise HostNotStarted(_failure_in(answer, errors))
 

@@ -10,7 +10,6 @@ import socket
 import sqlite3
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
@@ -197,25 +196,14 @@ def _reason(error: Exception) -> str:
     return " ".join(str(getattr(error, "orig", None) or error).split())
 
 
-@dataclass(frozen=True, slots=True)
-class SharedDocument:
-    """A document of one cell; ``place`` is the computer and folder of its runs."""
+def shared_documents(url: str, kind: DocumentKind) -> list[tuple[str, str, str, bytes]]:
+    """All documents of one kind, sorted: cell, place, run and content; raises ``ArchiveUnavailable``.
 
-    place: str
-    cell: str
-    run: str
-    content: bytes
-
-
-def shared_documents(url: str, kind: DocumentKind) -> tuple[SharedDocument, ...]:
-    """All documents of one kind, by cell, place and run; empty where no cell has put anything there.
-
-    Raises:
-        ArchiveUnavailable: it cannot be read.
+    The place is the computer and folder of the runs. Empty where no cell has put anything there.
     """
     columns = ARCHIVE_TABLE.c
     query = (
-        select(columns.place, columns.cell, columns.run, columns.content)
+        select(columns.cell, columns.place, columns.run, columns.content)
         .where(columns.kind == kind.value)
         .order_by(columns.cell, columns.place, columns.run)
     )
@@ -223,8 +211,8 @@ def shared_documents(url: str, kind: DocumentKind) -> tuple[SharedDocument, ...]
     try:
         with open_engine(address).connect() as connection:
             if not inspect(connection).has_table(ARCHIVE_TABLE.name):
-                return ()
-            return tuple(SharedDocument(*row) for row in connection.execute(query))
+                return []
+            return [row.tuple() for row in connection.execute(query)]
     except SQLAlchemyError as error:
         raise ArchiveUnavailable(
             f"the archive cannot be read ({_reason(error)})",

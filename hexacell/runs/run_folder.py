@@ -74,12 +74,8 @@ class RunFolder:
 
     @property
     def wire(self) -> Path:
-        """What went over the wires."""
+        """What went over the wires; of a resumed run it has other names too (:func:`unused`)."""
         return self.path / "wire"
-
-    def new_wire(self) -> Path:
-        """A new trace for a run that is resumed: what went over the wires before is kept."""
-        return _unused(self.wire)
 
     def create(self, cell: Cell) -> None:
         """Make the folder and keep the cell file's text, without its passwords, in it.
@@ -134,7 +130,7 @@ def new_run(cell: Cell) -> RunFolder:
 
 def new_run_in(folder: Path) -> RunFolder:
     """A folder for a run that begins now, below the folder of a cell's runs."""
-    return RunFolder(_unused(folder / datetime.now(UTC).strftime("%Y-%m-%dT%H%M%SZ")))
+    return RunFolder(unused(folder / datetime.now(UTC).strftime("%Y-%m-%dT%H%M%SZ")))
 
 
 def find_run(cell: Cell, named: str) -> RunFolder:
@@ -149,7 +145,7 @@ def find_run(cell: Cell, named: str) -> RunFolder:
     raise UsageError(f"there is no run '{named}'", action=f"The cell's runs are in {runs_folder(cell)}")
 
 
-def _unused(path: Path) -> Path:
+def unused(path: Path) -> Path:
     """The path, or the first of ``<path>-2``, ``<path>-3`` ... that does not exist."""
     others = (path.with_name(f"{path.name}-{number}") for number in itertools.count(2))
     return next(one for one in itertools.chain([path], others) if not one.exists())

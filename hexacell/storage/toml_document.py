@@ -281,22 +281,17 @@ def _split_keys(dotted: str) -> list[str]:
     return keys
 
 
-def secret_paths(document: TomlDocument) -> list[KeyPath]:
-    """Where the secrets of a document stand, those that are masked already left out."""
-    found = [path for path in document.spans if is_secret(path)]
-    return [path for path in found if not isinstance(document.value(path), list | dict | type(None))]
-
-
 def clear_secrets(document: TomlDocument) -> list[KeyPath]:
-    """The secrets of a document that are not masked."""
-    return [path for path in secret_paths(document) if document.value(path) != MASK]
+    """Where the secrets of a document stand that are not masked."""
+    found = [path for path in document.spans if is_secret(path) and document.value(path) != MASK]
+    return [path for path in found if not isinstance(document.value(path), list | dict)]
 
 
 @lru_cache(maxsize=4)
 def without_secrets(text: str) -> str:
     """A valid TOML text with every secret masked; every other character is kept."""
     document = TomlDocument.parse(text)
-    masked = document.replaced(dict.fromkeys(secret_paths(document), f'"{MASK}"'))
+    masked = document.replaced(dict.fromkeys(clear_secrets(document), f'"{MASK}"'))
     return _IN_AN_ADDRESS.sub(rf"\g<1>{MASK}", _without_secret_comments(masked))
 
 

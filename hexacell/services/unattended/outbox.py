@@ -119,8 +119,6 @@ Deliver = Callable[[NoticeAddress, Notice], None]
 LONGEST_NOTIFYING_S = 60.0
 """Longest time that a run waits for its notices, s; what is not delivered then waits for the next run."""
 
-OTHER_PROCESS = "another process is sending at this moment"
-
 
 @dataclass(frozen=True, slots=True)
 class Delivery:
@@ -190,7 +188,8 @@ def _send_all(
     try:
         with outbox.held() as is_ours:
             if not is_ours:
-                return NotifyOutcome((Delivery("the outbox", 0, 0, OTHER_PROCESS),))
+                problem = "another process is sending at this moment"
+                return NotifyOutcome((Delivery("the outbox", 0, 0, problem),))
             for pending in (*outbox.pending(), *unkept):
                 if pending.to in known:  # others are no longer notified; theirs wait until they are too old
                     queues[pending.to].append(pending)

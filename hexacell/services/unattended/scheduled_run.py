@@ -58,9 +58,7 @@ class ScheduledRun:
 
     @property
     def words_afterwards(self) -> tuple[str, ...]:
-        """The command that writes the metrics; empty without."""
-        if self.metrics is None:
-            return ()
+        """The command that writes the metrics."""
         return (*self.program, "status", str(self.cell), "--metrics", str(self.metrics))
 
     @property
@@ -130,12 +128,6 @@ def _unit(template: str, run: ScheduledRun, **values: object) -> str:
     )
     environment.filters |= {"plain": _plain, "quoted": _quoted, "command": _command}
     return environment.get_template(template).render(mark=MARK, run=run, stopping_s=STOPPING_S, **values)
-
-
-def cell_of(unit_text: str) -> Path | None:
-    """The cell file that a unit was written for; None if `hexacell schedule` did not write it."""
-    first = unit_text.split("\n", 1)[0]
-    return Path(first.removeprefix(MARK)) if first.startswith(MARK) else None
 
 
 def _plain(text: object) -> str:

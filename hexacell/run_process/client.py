@@ -147,11 +147,7 @@ async def connect_to_run(path: Path) -> HostConnection | None:
 
 
 async def start_host(path: Path, arguments: Sequence[str]) -> HostConnection:
-    """Start ``hexacell host`` with these arguments, and connect to it; its socket is ``path``.
-
-    Raises:
-        HostNotStarted: the reason.
-    """
+    """Start ``hexacell host`` and connect to it at ``path``; raises ``HostNotStarted``."""
     await asyncio.to_thread(_spawn, arguments)
     connection = await connect_to_run(path)
     if connection is None:

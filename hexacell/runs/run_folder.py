@@ -226,13 +226,10 @@ class ArchiveUnavailable(FileError):
 def folder_stamps(folder: Path) -> dict[str, str]:
     """The stamp of each run folder in ``folder``, by name; empty where ``folder`` does not exist.
 
-    Hidden folders are no runs.
+    Hidden folders are no runs. Raises ``FileError``.
 
     A journal only grows, and every other file of a run is put in its place by a rename, which changes the
     time of its folder. The times of status changes count, which no program can set.
-
-    Raises:
-        FileError: the folder cannot be read.
     """
     with os_errors("cannot be read", folder), suppress(FileNotFoundError), os.scandir(folder) as found:
         runs = [one for one in found if one.is_dir() and not one.name.startswith(".")]

@@ -33,11 +33,7 @@ class Access:
     login: Login | None = None
 
     def require_own_page(self, request: web.Request) -> None:
-        """Refuse what another page sends, or sends under a name that it made lead here.
-
-        Raises:
-            HTTPForbidden: it does.
-        """
+        """Refuse another page, or a name that it made lead here; raises ``HTTPForbidden``."""
         host = request.headers.get(hdrs.HOST, "")
         if (found := _HOST.fullmatch(host)) is None or not self._is_own_name(found[1]):
             raise web.HTTPForbidden(text="This computer is not served under that name.")

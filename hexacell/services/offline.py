@@ -138,11 +138,7 @@ def next_pose(cell: Cell, measurements: MeasurementSet, *, rejections: int = 0) 
 
 
 def try_plan(cell: Cell) -> PlanTrial:
-    """Carry out a cell's plan on robots drawn within its tolerances; takes some seconds.
-
-    Raises:
-        FileError: see :func:`plan_of`.
-    """
+    """Carry out a cell's plan on robots drawn within its tolerances; raises as :func:`plan_of`."""
     from hexacell.dry_run.campaign import dry_run  # noqa: PLC0415 - takes seconds anyway
     from hexacell.noise.noise_assessment import WINDOWS, AveragingForecaster, mean_of_independent  # noqa: PLC0415
 

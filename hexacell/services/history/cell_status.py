@@ -141,11 +141,7 @@ class FleetRun:
 
 
 def publish_status(status: CellStatus) -> None:
-    """Put the status of a cell into the archive that it shares, if it shares one.
-
-    Raises:
-        ArchiveUnavailable: it cannot be written.
-    """
+    """Put the status of a cell into the archive that it shares, if any; raises ``ArchiveUnavailable``."""
     cell = status.cell
     if cell.settings.archive.url is None:
         return

@@ -138,11 +138,7 @@ def deliver(
     longest_s: float = LONGEST_ATTEMPT_S,
     pause: Callable[[float], object] = time.sleep,
 ) -> None:
-    """Deliver a notice, at once or at another attempt after a ``pause``, s.
-
-    Raises:
-        NoticeUndelivered: with the reason of the last attempt.
-    """
+    """Deliver a notice, at once or later after a ``pause``, s; raises ``NoticeUndelivered``."""
     for pause_s in (*PAUSES_S, None):
         try:
             _attempt(address, notice, longest_s)

@@ -104,27 +104,21 @@ def ensure_certificate(folder: Path, uri: str, host: str) -> tuple[Path, Path]:
     certificate, key = folder / CERTIFICATE, folder / KEY
     if not (certificate.is_file() and key.is_file()):
         atomic_files.create_folder_durably(folder)
-        made_certificate, made_key = _made_certificate(uri, host)
+        private_key = cert_gen.generate_private_key()
+        made = cert_gen.generate_self_signed_app_certificate(  # as OPC 10000-6, 6.2.2 has it
+            private_key,
+            "hexacell",
+            {},
+            [x509.UniformResourceIdentifier(uri), x509.DNSName(host)],
+            extended=[ExtendedKeyUsageOID.SERVER_AUTH],
+            days=VALID_DAYS,
+        )
         with atomic_files.os_errors("cannot be written", key):
             key.unlink(missing_ok=True)
             with os.fdopen(os.open(key, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as stream:
-                stream.write(made_key)
-        atomic_files.write_own(certificate, made_certificate)
+                stream.write(cert_gen.dump_private_key_as_pem(private_key))
+        atomic_files.write_own(certificate, made.public_bytes(Encoding.DER))
     return certificate, key
-
-
-def _made_certificate(uri: str, host: str) -> tuple[bytes, bytes]:
-    """A certificate signed by itself, as OPC 10000-6, 6.2.2 has it (DER), and its key (PEM)."""
-    key = cert_gen.generate_private_key()
-    certificate = cert_gen.generate_self_signed_app_certificate(
-        key,
-        "hexacell",
-        {},
-        [x509.UniformResourceIdentifier(uri), x509.DNSName(host)],
-        extended=[ExtendedKeyUsageOID.SERVER_AUTH],
-        days=VALID_DAYS,
-    )
-    return certificate.public_bytes(Encoding.DER), cert_gen.dump_private_key_as_pem(key)
 
 
 class ResultNodes:

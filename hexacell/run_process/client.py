@@ -105,7 +105,10 @@ class HostConnection:
         self._is_left, self._goes_on_alone = True, keep_running
         with suppress(HexacellError, TimeoutError):
             await self._send(protocol.Leave(keep_running=keep_running))
-            await asyncio.wait_for(self._until_gone(), LET_GO_S if keep_running else STOP_S)
+            async with asyncio.timeout(LET_GO_S if keep_running else STOP_S):
+                # A stream tells its end to its only reader, and somebody else may be that.
+                while not self._reader.at_eof():  # noqa: ASYNC110
+                    await asyncio.sleep(0.01)
         self._writer.close()
 
     async def _send(self, message: protocol.ClientMessage) -> None:
@@ -116,11 +119,6 @@ class HostConnection:
             raise FileError(
                 "the run cannot be reached any more", action="Look at it with `hexacell history`"
             ) from error
-
-    async def _until_gone(self) -> None:
-        """Until the other side has closed; somebody else may be reading what it says."""
-        while not self._reader.at_eof():  # noqa: ASYNC110 - a stream tells this to its only reader
-            await asyncio.sleep(0.01)
 
 
 def _is_ending(message: protocol.HostMessage) -> bool:

@@ -28,7 +28,11 @@ _PEER = struct.Struct("3i")
 def socket_path(cell: Cell) -> Path:
     """Where the socket of a cell's run is; raises ``FileError`` where none can be."""
     name = sha256(os.fsencode(os.path.realpath(cell.config_path)))[:16]
-    path = _runtime_folder() / f"{name}.sock"
+    stated = os.environ.get("XDG_RUNTIME_DIR")
+    if stated and Path(stated).is_dir():
+        path = Path(stated) / "hexacell" / f"{name}.sock"
+    else:
+        path = Path(tempfile.gettempdir()) / f"hexacell-{os.getuid()}" / f"{name}.sock"
     if len(os.fsencode(path)) > LONGEST_SOCKET_PATH:
         raise FileError(
             "the path of a socket there would be too long",
@@ -95,10 +99,3 @@ def _bind(listener: socket.socket, path: Path) -> None:
         os.fchmod(listener.fileno(), 0o600)
         listener.bind(str(path))
         listener.listen()
-
-
-def _runtime_folder() -> Path:
-    stated = os.environ.get("XDG_RUNTIME_DIR")
-    if stated and Path(stated).is_dir():
-        return Path(stated) / "hexacell"
-    return Path(tempfile.gettempdir()) / f"hexacell-{os.getuid()}"

@@ -111,16 +111,12 @@ def runs_folder_of_unreadable(path: Path) -> Path | None:
     """Where the runs of the cell file at ``path``, which has mistakes, are; None if its name is unknown."""
     every = path.parent / "runs"
     with suppress(FileError, ValidationError):
-        text = read_bytes(path).decode(errors="replace")
-        return every / TypeAdapter(Name).validate_python(_stated_name(text))
+        lines = read_bytes(path).decode(errors="replace").splitlines()
+        above = itertools.takewhile(lambda line: not line.lstrip().startswith("["), lines)
+        name = next((one["name"] for one in map(_NAME.match, above) if one is not None), None)
+        return every / TypeAdapter(Name).validate_python(name)
     present = [one for one in every.glob("*") if one.is_dir()]
     return present[0] if len(present) == 1 else None
-
-
-def _stated_name(text: str) -> str | None:
-    """The name that a cell file states above its first section."""
-    above = itertools.takewhile(lambda line: not line.lstrip().startswith("["), text.splitlines())
-    return next((one["name"] for one in map(_NAME.match, above) if one is not None), None)
 
 
 def new_run(cell: Cell) -> RunFolder:

@@ -90,11 +90,7 @@ class CellStatus:
 
 
 def cell_status(cell: Cell) -> CellStatus:
-    """The status of a cell, from its run folders.
-
-    Raises:
-        FileError: the controller's config, or the folder of the runs, cannot be read.
-    """
+    """The status of a cell, from its run folders; raises as :func:`.past_runs`."""
     index = RunIndex(cell)
     runs = [run for run in past_runs(cell, index) if run.summary.ended is not None]
     latest = next(iter(runs), None)

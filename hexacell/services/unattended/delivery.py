@@ -204,7 +204,9 @@ def post_to_webhook(address: NoticeAddress, notice: Notice, timeout_s: float) ->
         raise NoticeUndelivered(f"the server answers {error.code}") from error
     except (OSError, HTTPException, ValueError) as error:
         reason = error.reason if isinstance(error, urllib.error.URLError) else error
-        raise NoticeUndelivered(address.masked(_words(reason))) from error
+        no_answer = "the server does not answer" if isinstance(reason, TimeoutError) else None
+        words = no_answer or getattr(reason, "strerror", None) or str(reason)
+        raise NoticeUndelivered(address.masked(words)) from error
 
 
 def _opener(address: NoticeAddress) -> urllib.request.OpenerDirector:
@@ -230,12 +232,6 @@ def _request(address: NoticeAddress, notice: Notice) -> urllib.request.Request:
         headers["Authorization"] = f"Basic {b64encode(login).decode()}"
     # Only http and https come here: the scheme chose this sender.
     return urllib.request.Request(address.url, notice.model_dump_json().encode(), headers)  # noqa: S310
-
-
-def _words(reason: object) -> str:
-    if isinstance(reason, TimeoutError):
-        return "the server does not answer"
-    return (reason.strerror if isinstance(reason, OSError) else None) or str(reason)
 
 
 if TYPE_CHECKING:

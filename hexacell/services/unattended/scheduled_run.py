@@ -28,7 +28,6 @@ class ScheduledRun:
 
     Attributes:
         cell: the cell file, absolute.
-        name: of the cell.
         program: the words that start hexacell, absolute.
         mode: ``check``, ``quick`` or ``optimise``.
         hour, minute: when it begins, in the computer's time zone.

@@ -212,7 +212,7 @@ def shared_documents(url: str, kind: DocumentKind) -> list[tuple[str, str, str, 
         with open_engine(address).connect() as connection:
             if not inspect(connection).has_table(ARCHIVE_TABLE.name):
                 return []
-            return [row.tuple() for row in connection.execute(query)]
+            return [(cell, place, run, data) for cell, place, run, data in connection.execute(query)]
     except SQLAlchemyError as error:
         raise ArchiveUnavailable(
             f"the archive cannot be read ({_reason(error)})",

@@ -5,8 +5,6 @@ with its Results, ResultMetaData, ResultReadyEventType. They are in a namespace 
 types of that specification, its structured data types and its methods among them, are not all here.
 """
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import os
@@ -14,11 +12,13 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import astuple, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Self
 
 from asyncua import ua
+from asyncua.common.node import Node
 from asyncua.crypto import cert_gen
 from asyncua.crypto.permission_rules import User, UserRole
+from asyncua.server.event_generator import EventGenerator
 from asyncua.server.server import Server
 from cryptography import x509
 from cryptography.hazmat.primitives.serialization import Encoding
@@ -30,10 +30,6 @@ from hexacell.cell.passwords import Login, stated_login
 from hexacell.errors import DeviceError, UsageError
 from hexacell.result_server.published_result import SEVERITIES, NewResults, PublishedResult
 from hexacell.storage import atomic_files
-
-if TYPE_CHECKING:
-    from asyncua.common.node import Node
-    from asyncua.server.event_generator import EventGenerator
 
 URI = "urn:hexacell:result-server"
 NAMESPACE = "urn:hexacell:results"
@@ -108,27 +104,21 @@ def ensure_certificate(folder: Path, uri: str, host: str) -> tuple[Path, Path]:
     certificate, key = folder / CERTIFICATE, folder / KEY
     if not (certificate.is_file() and key.is_file()):
         atomic_files.create_folder_durably(folder)
-        made_certificate, made_key = _made_certificate(uri, host)
+        private_key = cert_gen.generate_private_key()
+        made = cert_gen.generate_self_signed_app_certificate(  # as OPC 10000-6, 6.2.2 has it
+            private_key,
+            "hexacell",
+            {},
+            [x509.UniformResourceIdentifier(uri), x509.DNSName(host)],
+            extended=[ExtendedKeyUsageOID.SERVER_AUTH],
+            days=VALID_DAYS,
+        )
         with atomic_files.os_errors("cannot be written", key):
             key.unlink(missing_ok=True)
             with os.fdopen(os.open(key, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as stream:
-                stream.write(made_key)
-        atomic_files.write_own(certificate, made_certificate)
+                stream.write(cert_gen.dump_private_key_as_pem(private_key))
+        atomic_files.write_own(certificate, made.public_bytes(Encoding.DER))
     return certificate, key
-
-
-def _made_certificate(uri: str, host: str) -> tuple[bytes, bytes]:
-    """A certificate signed by itself, as OPC 10000-6, 6.2.2 has it (DER), and its key (PEM)."""
-    key = cert_gen.generate_private_key()
-    certificate = cert_gen.generate_self_signed_app_certificate(
-        key,
-        "hexacell",
-        {},
-        [x509.UniformResourceIdentifier(uri), x509.DNSName(host)],
-        extended=[ExtendedKeyUsageOID.SERVER_AUTH],
-        days=VALID_DAYS,
-    )
-    return certificate.public_bytes(Encoding.DER), cert_gen.dump_private_key_as_pem(key)
 
 
 class ResultNodes:
@@ -139,7 +129,7 @@ class ResultNodes:
         self._shown: deque[Node] = deque()
 
     @classmethod
-    async def of(cls, server: Server, cell: str) -> ResultNodes:
+    async def of(cls, server: Server, cell: str) -> Self:
         """Make the nodes of a cell: Objects / its name / ResultManagement / Results."""
         namespace = await server.register_namespace(NAMESPACE)
         event_type = await server.create_custom_event_type(

@@ -105,12 +105,11 @@ def compare_results(
     values, axes = np.linalg.eigh(covariance[np.ix_(free, free)])
     is_own = values > TIED * values.max()
     chi2 = float(np.sum((change[free] @ axes[:, is_own]) ** 2 / values[is_own]))
+    numbers = zip(parameters.parameters, old.tolist(), new.tolist(), sigma.tolist(), strict=True)
     differences = tuple(
-        ParameterDifference(one.name, one.kind.unit.value, *numbers)
-        for row, *numbers in zip(
-            free.tolist(), old[free].tolist(), new[free].tolist(), sigma[free].tolist(), strict=True
-        )
-        for one in (parameters.parameters[row],)
+        ParameterDifference(one.name, one.kind.unit.value, *of_one)
+        for one, *of_one in numbers
+        if of_one[-1] > 0.0
     )
     return RunComparison(after.frame, differences, ChiSquareTest(chi2, float(is_own.sum())))
 

@@ -27,7 +27,6 @@ class TermResult(Frozen):
     """A term that was offered.
 
     Attributes:
-        name: of the term.
         finding: what the records say of it.
         log_factor: logarithm of the Bayes factor.
         predicted: by how much better points are predicted from the others with it, in the logarithm of the

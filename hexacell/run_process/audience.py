@@ -2,17 +2,16 @@
 
 import asyncio
 import os
-import pwd
 from asyncio import StreamReader, StreamWriter
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from socket import socket
 
 from hexacell.errors import HexacellError, UsageError
 from hexacell.run_process import messages
 from hexacell.run_process.run_socket import peer_of
+from hexacell.runs.cell_lock import user_name
 from procedures.engine.commands import Command
 
 STUCK_S = 10.0
@@ -115,7 +114,7 @@ class Audience:
         self._serving.add(serving)
         try:
             if user == os.getuid():
-                await self._serve_client(reader, _Client(f"{_name_of(user)}, process {process}", outbox))
+                await self._serve_client(reader, _Client(f"{user_name()}, process {process}", outbox))
         finally:
             writer.close()
             with suppress(OSError):
@@ -223,15 +222,3 @@ class Audience:
     def _send_control(self, client: _Client) -> None:
         changed = messages.ControlChanged(is_in_control=client is self._in_control, who=self._who)
         client.outbox.put(messages.message_line(changed))
-
-
-async def audience_server(audience: Audience, listener: socket) -> asyncio.Server:
-    """The server of a run, on a socket that listens."""
-    return await asyncio.start_unix_server(audience.serve, sock=listener, limit=messages.LONGEST_MESSAGE)
-
-
-def _name_of(user: int) -> str:
-    try:
-        return pwd.getpwuid(user).pw_name
-    except KeyError:
-        return f"user {user}"

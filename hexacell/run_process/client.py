@@ -2,11 +2,13 @@
 
 import asyncio
 import os
+import subprocess
 import tempfile
 from asyncio import StreamReader, StreamWriter
 from collections.abc import AsyncIterator, Sequence
 from contextlib import suppress
 from pathlib import Path
+from subprocess import DEVNULL, PIPE
 from typing import BinaryIO, Protocol
 
 from hexacell.errors import ExitCode, FileError, HexacellError
@@ -103,7 +105,10 @@ class HostConnection:
         self._is_left, self._goes_on_alone = True, keep_running
         with suppress(HexacellError, TimeoutError):
             await self._send(protocol.Leave(keep_running=keep_running))
-            await asyncio.wait_for(self._until_gone(), LET_GO_S if keep_running else STOP_S)
+            async with asyncio.timeout(LET_GO_S if keep_running else STOP_S):
+                # A stream tells its end to its only reader, and somebody else may be that.
+                while not self._reader.at_eof():  # noqa: ASYNC110
+                    await asyncio.sleep(0.01)
         self._writer.close()
 
     async def _send(self, message: protocol.ClientMessage) -> None:
@@ -114,11 +119,6 @@ class HostConnection:
             raise FileError(
                 "the run cannot be reached any more", action="Look at it with `hexacell history`"
             ) from error
-
-    async def _until_gone(self) -> None:
-        """Until the other side has closed; somebody else may be reading what it says."""
-        while not self._reader.at_eof():  # noqa: ASYNC110 - a stream tells this to its only reader
-            await asyncio.sleep(0.01)
 
 
 def _is_ending(message: protocol.HostMessage) -> bool:
@@ -145,11 +145,7 @@ async def connect_to_run(path: Path) -> HostConnection | None:
 
 
 async def start_host(path: Path, arguments: Sequence[str]) -> HostConnection:
-    """Start ``hexacell host`` with these arguments, and connect to it; its socket is ``path``.
-
-    Raises:
-        HostNotStarted: the reason.
-    """
+    """Start ``hexacell host`` and connect to it at ``path``; raises ``HostNotStarted``."""
     await asyncio.to_thread(_spawn, arguments)
     connection = await connect_to_run(path)
     if connection is None:
@@ -159,20 +155,11 @@ async def start_host(path: Path, arguments: Sequence[str]) -> HostConnection:
 
 def _spawn(arguments: Sequence[str]) -> None:
     """Start the process and wait until it listens; it is no child of this one then."""
-    answered, answering = os.pipe()
-    with tempfile.TemporaryFile() as errors, os.fdopen(answered, "rb") as answers:
-        streams = [  # nothing to read, the answer on stdout, and messages of the interpreter in a file
-            (os.POSIX_SPAWN_OPEN, 0, os.devnull, os.O_RDONLY, 0),
-            (os.POSIX_SPAWN_DUP2, answering, 1),
-            (os.POSIX_SPAWN_DUP2, errors.fileno(), 2),
-        ]
-        command = python_command("hexacell", "host", *arguments)
-        try:
-            process = os.posix_spawn(command[0], command, os.environ, file_actions=streams, setsid=True)
-        finally:
-            os.close(answering)
-        os.waitpid(process, 0)
-        answer = answers.readline()
+    command = python_command("hexacell", "host", *arguments)
+    with tempfile.TemporaryFile() as errors:
+        answer = subprocess.run(  # noqa: S603 - this program; its stdout ends with the answer
+            command, stdin=DEVNULL, stdout=PIPE, stderr=errors, start_new_session=True, check=False
+        ).stdout
         if answer != READY:
             raise HostNotStarted(_failure_in(answer, errors))
 

@@ -64,7 +64,6 @@ class GaugeSnapshot(Frozen):
         shown_mm: its latest reading; None before the first one.
         unit: the display's unit; a gauge that shows another one is refused, and ``problem`` says so.
         noise_mm: standard deviation of its latest readings at standstill; None before there are some.
-        problem: why it did not answer since; empty if it did.
         travel_mm: its measuring range.
         middle_mm: what it shows in the middle of that; None where its display does not say.
     """

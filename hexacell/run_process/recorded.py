@@ -24,13 +24,13 @@ class RecordedRun:
     """A :class:`~hexacell.run_process.client.RunConnection` that sends a journal up to its cursor.
 
     Questions are sent where the journal shows that they were asked: those to place gauges. A run that still
-    goes on is shown as far as it was. The cursor stands at the line ``sequence`` at first; 0 is the end.
+    goes on is shown as far as it was. The cursor stands at the end at first.
 
     Raises:
         FileError: the journal cannot be read, or is empty.
     """
 
-    def __init__(self, folder: RunFolder, sequence: int = 0, clock: CellClock | None = None) -> None:
+    def __init__(self, folder: RunFolder, clock: CellClock | None = None) -> None:
         self._folder = folder
         self._entries: Sequence[Entry] = read_entries(folder.journal)
         if not self._entries or not isinstance(self._entries[0].event, events.RunStarted):
@@ -40,17 +40,12 @@ class RecordedRun:
         self._sequence, self._speed = 0, 0.0
         self._moved = asyncio.Event()
         self._is_left = False
-        self.jump(sequence or self.last)
+        self.jump(self.last)
 
     @property
     def last(self) -> int:
         """How many lines its journal has."""
         return len(self._entries)
-
-    @property
-    def sequence(self) -> int:
-        """The line of the journal that was sent last, from 1."""
-        return self._sequence
 
     def step(self, count: int = 1) -> None:
         """Advance by a number of events, or go back if it is negative; stops at both ends."""

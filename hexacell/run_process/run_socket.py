@@ -6,7 +6,6 @@ for the same robot find the same run.
 """
 
 import fcntl
-import hashlib
 import os
 import socket
 import stat
@@ -18,7 +17,7 @@ from pathlib import Path
 
 from hexacell.cell.loader import Cell
 from hexacell.errors import CellBusy, FileError
-from hexacell.storage.atomic_files import os_errors
+from hexacell.storage.atomic_files import os_errors, sha256
 
 LONGEST_SOCKET_PATH = 107
 """Bytes: what Linux takes."""
@@ -28,9 +27,12 @@ _PEER = struct.Struct("3i")
 
 def socket_path(cell: Cell) -> Path:
     """Where the socket of a cell's run is; raises ``FileError`` where none can be."""
-    config = os.path.realpath(cell.config_path)
-    name = hashlib.sha256(os.fsencode(config)).hexdigest()[:16]
-    path = _runtime_folder() / f"{name}.sock"
+    name = sha256(os.fsencode(os.path.realpath(cell.config_path)))[:16]
+    stated = os.environ.get("XDG_RUNTIME_DIR")
+    if stated and Path(stated).is_dir():
+        path = Path(stated) / "hexacell" / f"{name}.sock"
+    else:
+        path = Path(tempfile.gettempdir()) / f"hexacell-{os.getuid()}" / f"{name}.sock"
     if len(os.fsencode(path)) > LONGEST_SOCKET_PATH:
         raise FileError(
             "the path of a socket there would be too long",
@@ -59,16 +61,17 @@ def listening_socket(path: Path) -> Iterator[socket.socket]:
             subject=path.parent,
             action="Remove it, or set XDG_RUNTIME_DIR to a folder of yours with mode 700",
         )
-    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    try:
-        with _alone_in(path.parent):
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
+        folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            fcntl.flock(folder, fcntl.LOCK_EX)  # no other process makes a socket there meanwhile
             _bind(listener, path)
+        finally:
+            os.close(folder)
         try:
             yield listener
         finally:
             path.unlink(missing_ok=True)
-    finally:
-        listener.close()
 
 
 def is_served(path: Path) -> bool:
@@ -96,21 +99,3 @@ def _bind(listener: socket.socket, path: Path) -> None:
         os.fchmod(listener.fileno(), 0o600)
         listener.bind(str(path))
         listener.listen()
-
-
-def _runtime_folder() -> Path:
-    stated = os.environ.get("XDG_RUNTIME_DIR")
-    if stated and Path(stated).is_dir():
-        return Path(stated) / "hexacell"
-    return Path(tempfile.gettempdir()) / f"hexacell-{os.getuid()}"
-
-
-@contextmanager
-def _alone_in(folder: Path) -> Iterator[None]:
-    """No other process makes a socket there meanwhile; no lock is left."""
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(descriptor)

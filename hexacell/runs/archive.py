@@ -10,7 +10,6 @@ import socket
 import sqlite3
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
@@ -95,11 +94,7 @@ class Archive:
         return open_engine(self._url, ". The runs are read from their folders")
 
     def documents(self, kind: DocumentKind) -> dict[str, StampedDocument]:
-        """All documents of one kind, by the names of their runs.
-
-        Raises:
-            ArchiveUnavailable: it cannot be read.
-        """
+        """All documents of one kind, by the names of their runs; raises ``ArchiveUnavailable``."""
         query = select(ARCHIVE_TABLE.c.run, ARCHIVE_TABLE.c.stamp, ARCHIVE_TABLE.c.content).where(
             ARCHIVE_TABLE.c.place == self._place, ARCHIVE_TABLE.c.kind == kind.value
         )
@@ -108,11 +103,7 @@ class Archive:
         return {run: StampedDocument(stamp, content) for run, stamp, content in rows}
 
     def store(self, kind: DocumentKind, documents: Mapping[str, StampedDocument]) -> None:
-        """Keep documents, in the place of older ones.
-
-        Raises:
-            ArchiveUnavailable: it cannot be written.
-        """
+        """Keep documents, in the place of older ones; raises ``ArchiveUnavailable``."""
         rows = [
             {"place": self._place, "run": run, "kind": kind.value, "cell": self._cell}
             | {"stamp": one.stamp, "content": one.content}
@@ -128,11 +119,7 @@ class Archive:
             self._transact(lambda connection: connection.execute(upsert, rows))
 
     def forget(self, runs: Sequence[str]) -> None:
-        """Drop everything about runs that are gone.
-
-        Raises:
-            ArchiveUnavailable: it cannot be written.
-        """
+        """Drop everything about runs that are gone; raises ``ArchiveUnavailable``."""
         query = ARCHIVE_TABLE.delete().where(
             ARCHIVE_TABLE.c.place == self._place, ARCHIVE_TABLE.c.run == bindparam("of_run")
         )
@@ -209,25 +196,14 @@ def _reason(error: Exception) -> str:
     return " ".join(str(getattr(error, "orig", None) or error).split())
 
 
-@dataclass(frozen=True, slots=True)
-class SharedDocument:
-    """A document of one cell; ``place`` is the computer and folder of its runs."""
+def shared_documents(url: str, kind: DocumentKind) -> list[tuple[str, str, str, bytes]]:
+    """All documents of one kind, sorted: cell, place, run and content; raises ``ArchiveUnavailable``.
 
-    place: str
-    cell: str
-    run: str
-    content: bytes
-
-
-def shared_documents(url: str, kind: DocumentKind) -> tuple[SharedDocument, ...]:
-    """All documents of one kind, by cell, place and run; empty where no cell has put anything there.
-
-    Raises:
-        ArchiveUnavailable: it cannot be read.
+    The place is the computer and folder of the runs. Empty where no cell has put anything there.
     """
     columns = ARCHIVE_TABLE.c
     query = (
-        select(columns.place, columns.cell, columns.run, columns.content)
+        select(columns.cell, columns.place, columns.run, columns.content)
         .where(columns.kind == kind.value)
         .order_by(columns.cell, columns.place, columns.run)
     )
@@ -235,8 +211,8 @@ def shared_documents(url: str, kind: DocumentKind) -> tuple[SharedDocument, ...]
     try:
         with open_engine(address).connect() as connection:
             if not inspect(connection).has_table(ARCHIVE_TABLE.name):
-                return ()
-            return tuple(SharedDocument(*row) for row in connection.execute(query))
+                return []
+            return [(cell, place, run, data) for cell, place, run, data in connection.execute(query)]
     except SQLAlchemyError as error:
         raise ArchiveUnavailable(
             f"the archive cannot be read ({_reason(error)})",

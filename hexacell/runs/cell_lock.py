@@ -94,10 +94,7 @@ def _lock_of_file(config: Path) -> Iterator[None]:
 def lock_holder(config: Path) -> str | None:
     """Who holds the cell, by the note in its lock; None if nobody does, or could not leave one.
 
-    The lock itself is not tried: who takes it at that moment would find it held.
-
-    Raises:
-        FileError: the lock file cannot be read.
+    The lock itself is not tried: who takes it at that moment would find it held. Raises ``FileError``.
     """
     path = lock_path(config)
     try:

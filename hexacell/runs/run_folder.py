@@ -74,12 +74,8 @@ class RunFolder:
 
     @property
     def wire(self) -> Path:
-        """What went over the wires."""
+        """What went over the wires; of a resumed run it has other names too (:func:`unused`)."""
         return self.path / "wire"
-
-    def new_wire(self) -> Path:
-        """A new trace for a run that is resumed: what went over the wires before is kept."""
-        return _unused(self.wire)
 
     def create(self, cell: Cell) -> None:
         """Make the folder and keep the cell file's text, without its passwords, in it.
@@ -115,16 +111,12 @@ def runs_folder_of_unreadable(path: Path) -> Path | None:
     """Where the runs of the cell file at ``path``, which has mistakes, are; None if its name is unknown."""
     every = path.parent / "runs"
     with suppress(FileError, ValidationError):
-        text = read_bytes(path).decode(errors="replace")
-        return every / TypeAdapter(Name).validate_python(_stated_name(text))
+        lines = read_bytes(path).decode(errors="replace").splitlines()
+        above = itertools.takewhile(lambda line: not line.lstrip().startswith("["), lines)
+        name = next((one["name"] for one in map(_NAME.match, above) if one is not None), None)
+        return every / TypeAdapter(Name).validate_python(name)
     present = [one for one in every.glob("*") if one.is_dir()]
     return present[0] if len(present) == 1 else None
-
-
-def _stated_name(text: str) -> str | None:
-    """The name that a cell file states above its first section."""
-    above = itertools.takewhile(lambda line: not line.lstrip().startswith("["), text.splitlines())
-    return next((one["name"] for one in map(_NAME.match, above) if one is not None), None)
 
 
 def new_run(cell: Cell) -> RunFolder:
@@ -134,15 +126,11 @@ def new_run(cell: Cell) -> RunFolder:
 
 def new_run_in(folder: Path) -> RunFolder:
     """A folder for a run that begins now, below the folder of a cell's runs."""
-    return RunFolder(_unused(folder / datetime.now(UTC).strftime("%Y-%m-%dT%H%M%SZ")))
+    return RunFolder(unused(folder / datetime.now(UTC).strftime("%Y-%m-%dT%H%M%SZ")))
 
 
 def find_run(cell: Cell, named: str) -> RunFolder:
-    """A run by its folder, or by its name within the cell's runs.
-
-    Raises:
-        UsageError: there is no such run.
-    """
+    """A run by its folder, or by its name within the cell's runs; raises ``UsageError``."""
     for path in (Path(named), runs_folder(cell) / named) if named.strip() else ():
         if RunFolder(path).journal.is_file():
             return RunFolder(path)
@@ -153,7 +141,7 @@ def find_run(cell: Cell, named: str) -> RunFolder:
     raise UsageError(f"there is no run '{named}'", action=f"The cell's runs are in {runs_folder(cell)}")
 
 
-def _unused(path: Path) -> Path:
+def unused(path: Path) -> Path:
     """The path, or the first of ``<path>-2``, ``<path>-3`` ... that does not exist."""
     others = (path.with_name(f"{path.name}-{number}") for number in itertools.count(2))
     return next(one for one in itertools.chain([path], others) if not one.exists())
@@ -190,11 +178,7 @@ class StartAttempts(Frozen):
 
 
 def read_attempts(folder: RunFolder) -> StartAttempts | None:
-    """The tries that a run folder keeps; None where the run began at once.
-
-    Raises:
-        FileError: they cannot be read.
-    """
+    """The tries that a run folder keeps; None where the run began at once; raises ``FileError``."""
     path = folder.attempts
     if not path.is_file():
         return None
@@ -207,11 +191,7 @@ def read_attempts(folder: RunFolder) -> StartAttempts | None:
 
 
 def note_attempt(folder: RunFolder, mode: str, attempt: StartAttempt) -> None:
-    """Add a try to those that a run folder keeps; the folder is made.
-
-    Raises:
-        FileError: it cannot be written.
-    """
+    """Add a try to those that a run folder keeps; the folder is made; raises ``FileError``."""
     before = read_attempts(folder)
     attempts = StartAttempts(mode=mode, attempts=(*(before.attempts if before else ()), attempt))
     create_folder_durably(folder.path)
@@ -242,13 +222,10 @@ class ArchiveUnavailable(FileError):
 def folder_stamps(folder: Path) -> dict[str, str]:
     """The stamp of each run folder in ``folder``, by name; empty where ``folder`` does not exist.
 
-    Hidden folders are no runs.
+    Hidden folders are no runs. Raises ``FileError``.
 
     A journal only grows, and every other file of a run is put in its place by a rename, which changes the
     time of its folder. The times of status changes count, which no program can set.
-
-    Raises:
-        FileError: the folder cannot be read.
     """
     with os_errors("cannot be read", folder), suppress(FileNotFoundError), os.scandir(folder) as found:
         runs = [one for one in found if one.is_dir() and not one.name.startswith(".")]

@@ -8,18 +8,16 @@ import base64
 import ipaddress
 import os
 import re
-import struct
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 
 from aiohttp import hdrs, web
 
 from hexacell.cell.passwords import Login
+from hexacell.services.preflight import kernel_connections
 
 CHALLENGE = {hdrs.WWW_AUTHENTICATE: 'Basic realm="hexacell", charset="UTF-8"'}
 _HOST = re.compile(r"(\[[0-9a-f:.]+\]|[a-z0-9._-]+)(:[0-9]{1,5})?", re.IGNORECASE)
-_CONNECTIONS = (Path("/proc/net/tcp"), Path("/proc/net/tcp6"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,11 +33,7 @@ class Access:
     login: Login | None = None
 
     def require_own_page(self, request: web.Request) -> None:
-        """Refuse what another page sends, or sends under a name that it made lead here.
-
-        Raises:
-            HTTPForbidden: it does.
-        """
+        """Refuse another page, or a name that it made lead here; raises ``HTTPForbidden``."""
         host = request.headers.get(hdrs.HOST, "")
         if (found := _HOST.fullmatch(host)) is None or not self._is_own_name(found[1]):
             raise web.HTTPForbidden(text="This computer is not served under that name.")
@@ -76,18 +70,6 @@ class Access:
 def _user_at(transport: object) -> int | None:
     """The user at the other end of a connection within this computer; None if that is not known."""
     get = transport.get_extra_info  # type: ignore[attr-defined]
-    ends = [_as_in_table(*get(name)[:2]) for name in ("peername", "sockname")]
-    for table in _CONNECTIONS:
-        with suppress(OSError, ValueError, LookupError):
-            for line in table.read_text(encoding="ascii").splitlines()[1:]:
-                columns = line.split()
-                if columns[1:3] == ends:
-                    return int(columns[7])
-    return None
-
-
-def _as_in_table(address: str, port: int) -> str:
-    """As the kernel writes it: words of four bytes, each in the computer's own order."""
-    packed = ipaddress.ip_address(address).packed
-    words = struct.unpack(f"={len(packed) // 4}I", packed)
-    return "".join(f"{word:08X}" for word in words) + f":{port:04X}"
+    ends = [(ipaddress.ip_address(get(name)[0]).packed, get(name)[1]) for name in ("peername", "sockname")]
+    rows = kernel_connections()
+    return next((int(columns[7]) for this, other, columns in rows if [this, other] == ends), None)

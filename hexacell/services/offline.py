@@ -13,19 +13,20 @@ from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
 from hexacell.errors import FileError, HexacellError, UsageError, joined
+from hexacell.identification.estimator import identify
 from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.identification.problem.random_walk import NO_WALK
 from hexacell.identification.thermal_expansion import known_parts
 from hexacell.measurements.records import MeasurementSet, RecordId
+from hexacell.noise.measured_noise import AveragingForecast, with_measured_noise
 from hexacell.robot.model import robot_of
 from hexacell.robot.stated import stated_effects
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services.design_facts import StatedPose, require_design, stated_poses
+from hexacell.verdict.assessment import Assessment, assess
 
 if TYPE_CHECKING:
     from hexacell.dry_run.campaign import DryRunResult
-    from hexacell.noise.measured_noise import AveragingForecast
-    from hexacell.verdict.assessment import Assessment
 
 MOST_RECORDS_BEFORE_NEXT = 500
 """The estimate is made again record by record, as in a run."""
@@ -85,13 +86,9 @@ def fit_measurements(
         IdentifiabilityError: the records cannot determine it.
         FileError: the controller's config cannot be read.
     """
-    from hexacell.identification.estimator import identify  # noqa: PLC0415 - not for a plan
-    from hexacell.verdict.assessment import assess  # noqa: PLC0415 - likewise
-
     robot, settings, measured = robot_of(cell), cell.settings, None
     if folder is not None and folder.journal.is_file():
-        from hexacell.noise.measured_noise import with_measured_noise  # noqa: PLC0415 - only for a run
-        from hexacell.services.history.recorded_cell import commanding_geometries, recorded_state  # noqa: PLC0415 - likewise
+        from hexacell.services.history.recorded_cell import commanding_geometries, recorded_state  # noqa: PLC0415 - only for a run
 
         run = recorded_state(folder, settings)
         robot = replace(robot, earlier=(*commanding_geometries(run, robot.mechanism), *robot.earlier))
@@ -141,11 +138,7 @@ def next_pose(cell: Cell, measurements: MeasurementSet, *, rejections: int = 0) 
 
 
 def try_plan(cell: Cell) -> PlanTrial:
-    """Carry out a cell's plan on robots drawn within its tolerances; takes some seconds.
-
-    Raises:
-        FileError: see :func:`plan_of`.
-    """
+    """Carry out a cell's plan on robots drawn within its tolerances; raises as :func:`plan_of`."""
     from hexacell.dry_run.campaign import dry_run  # noqa: PLC0415 - takes seconds anyway
     from hexacell.noise import noise_assessment  # noqa: PLC0415 - likewise
 

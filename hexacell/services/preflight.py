@@ -20,8 +20,8 @@ from hexacell.errors import FileError, UsageError
 from hexacell.kinematics.pose import Pose
 from hexacell.storage.atomic_files import BYTE_ORDER_MARK, read_bytes, read_if_present, write_atomically
 
-_TABLES = (Path("/proc/net/tcp"), Path("/proc/net/tcp6"))
-"""The kernel's tables of the ports of this computer."""
+TABLES = (Path("/proc/net/tcp"), Path("/proc/net/tcp6"))
+"""The kernel's tables of the connections and the open ports of this computer."""
 _LISTENING = "0A"
 _LATENCY_TIMERS = Path("/sys/bus/usb-serial/devices")
 
@@ -160,19 +160,30 @@ def port_warnings(cell: Cell, timers: Path = _LATENCY_TIMERS) -> Iterator[str]:
             yield f"gauge {name}: tomorrow {port} may be another: docs/howto-host.md, Names that stay"
 
 
-def accepts_from_network(port: int, tables: Sequence[Path] = _TABLES) -> bool:
+def accepts_from_network(port: int, tables: Sequence[Path] = TABLES) -> bool:
     """Whether something listens at ``port`` beyond the loopback addresses; False if that is not known."""
+    return any(
+        own_port == port and columns[3] == _LISTENING and not ipaddress.ip_address(address).is_loopback
+        for (address, own_port), _, columns in kernel_connections(tables)
+    )
+
+
+def kernel_connections(
+    tables: Sequence[Path] = TABLES,
+) -> Iterator[tuple[tuple[bytes, int], tuple[bytes, int], list[str]]]:
+    """This end and the other of each row of the tables, as packed address and port, and all its columns."""
     for table in tables:
-        with suppress(OSError, ValueError, LookupError):
+        with suppress(OSError, ValueError, LookupError, struct.error):
             for line in table.read_text(encoding="ascii").splitlines()[1:]:
-                _, local, _, state = line.split()[:4]
-                address, _, own_port = local.partition(":")
-                if state == _LISTENING and int(own_port, 16) == port:
-                    # As the kernel writes it: words of four bytes, each in the computer's own order.
-                    words = [int(address[start : start + 8], 16) for start in range(0, len(address), 8)]
-                    if not ipaddress.ip_address(struct.pack(f"={len(words)}I", *words)).is_loopback:
-                        return True
-    return False
+                columns = line.split()
+                yield _end(columns[1]), _end(columns[2]), columns
+
+
+def _end(written: str) -> tuple[bytes, int]:
+    """As the kernel writes it: the address in words of four bytes, each in the computer's own order."""
+    address, _, port = written.partition(":")
+    words = [int(address[start : start + 8], 16) for start in range(0, len(address), 8)]
+    return struct.pack(f"={len(words)}I", *words), int(port, 16)
 
 
 def is_loopback(host: str) -> bool:

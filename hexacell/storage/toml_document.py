@@ -155,22 +155,20 @@ def _file_errors(text: str, source: Path | None) -> Iterator[None]:
     try:
         yield
     except tomllib.TOMLDecodeError as error:
-        raise _syntax_error(str(error), text, source) from error
+        position = _POSITION.search(str(error))
+        last = text.count("\n") + (not text.endswith("\n"))
+        line = int(position["line"]) if position and position["line"] else last
+        problem = _POSITION.sub("", str(error))
+        # "Cannot overwrite a value", "Cannot declare ('gauges',) twice" and similar messages.
+        problem = "a key or a section is defined twice" if problem.startswith("Cannot ") else problem
+        raise FileError(
+            f"not valid TOML: {problem}", subject=source, line=line, action="Correct this line"
+        ) from error
     except RecursionError:
         raise FileError("brackets are nested too deeply", subject=source, action="Remove some") from None
     except ValueError:
         # Python refuses to read or write integers of thousands of digits, without saying where.
         raise FileError("a number has too many digits", subject=source, action="Shorten it") from None
-
-
-def _syntax_error(message: str, text: str, source: Path | None) -> FileError:
-    position = _POSITION.search(message)
-    last = text.count("\n") + (not text.endswith("\n"))
-    line = int(position["line"]) if position and position["line"] else last
-    problem = _POSITION.sub("", message)
-    # "Cannot overwrite a value", "Cannot declare ('gauges',) twice" and similar messages.
-    problem = "a key or a section is defined twice" if problem.startswith("Cannot ") else problem
-    return FileError(f"not valid TOML: {problem}", subject=source, line=line, action="Correct this line")
 
 
 _BLANKS = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
@@ -281,38 +279,26 @@ def _split_keys(dotted: str) -> list[str]:
     return keys
 
 
-def secret_paths(document: TomlDocument) -> list[KeyPath]:
-    """Where the secrets of a document stand, those that are masked already left out."""
-    found = [path for path in document.spans if is_secret(path)]
-    return [path for path in found if not isinstance(document.value(path), list | dict | type(None))]
-
-
 def clear_secrets(document: TomlDocument) -> list[KeyPath]:
-    """The secrets of a document that are not masked."""
-    return [path for path in secret_paths(document) if document.value(path) != MASK]
+    """Where the secrets of a document stand that are not masked."""
+    found = [path for path in document.spans if is_secret(path) and document.value(path) != MASK]
+    return [path for path in found if not isinstance(document.value(path), list | dict)]
 
 
 @lru_cache(maxsize=4)
 def without_secrets(text: str) -> str:
     """A valid TOML text with every secret masked; every other character is kept."""
     document = TomlDocument.parse(text)
-    masked = document.replaced(dict.fromkeys(secret_paths(document), f'"{MASK}"'))
-    return _IN_AN_ADDRESS.sub(rf"\g<1>{MASK}", _without_secret_comments(masked))
+    masked = TomlDocument.parse(document.replaced(dict.fromkeys(clear_secrets(document), f'"{MASK}"')))
+    values = [span for at, span in masked.spans.items() if not isinstance(masked.value(at), list | dict)]
+
+    def in_a_comment(found: re.Match[str]) -> str:
+        is_in_a_value = any(span.start <= found.start() < span.stop for span in values)
+        return found[0] if is_in_a_value else f"{found[1]}{MASK}"
+
+    return _IN_AN_ADDRESS.sub(rf"\g<1>{MASK}", _IN_A_COMMENT.sub(in_a_comment, masked.text))
 
 
 def with_lines_masked(text: str) -> str:
     """Any text, valid or not, with what follows the name of a secret masked up to the end of its line."""
     return _IN_AN_ADDRESS.sub(rf"\g<1>{MASK}", _LIKE_A_SECRET.sub(rf'\g<1>"{MASK}"', text))
-
-
-def _without_secret_comments(text: str) -> str:
-    document = TomlDocument.parse(text)
-    values = [
-        span for path, span in document.spans.items() if not isinstance(document.value(path), list | dict)
-    ]
-
-    def masked(found: re.Match[str]) -> str:
-        in_a_value = any(span.start <= found.start() < span.stop for span in values)
-        return found[0] if in_a_value else f"{found[1]}{MASK}"
-
-    return _IN_A_COMMENT.sub(masked, text)

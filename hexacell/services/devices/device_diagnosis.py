@@ -72,7 +72,6 @@ class DeviceDiagnosis:
     """What was seen of a device.
 
     Attributes:
-        failures: what came instead of a reading.
         problem: why it was not watched to the end, or what its settings are wrong by; empty if neither.
     """
 

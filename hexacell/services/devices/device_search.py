@@ -101,11 +101,8 @@ def gauge_keys(gauge: FoundGauge) -> Document:
     decimals = len(gauge.shown.rstrip("<=>, M").partition(".")[2])
     channel = {} if gauge.channel is None else {"channel": gauge.channel}
     line = {} if gauge.baudrate is None else {"serial": {"baudrate": gauge.baudrate}}
-    return {
-        **channel,
-        **line,
-        **({"resolution_mm": round(10.0**-decimals, decimals)} if 0 < decimals < PADDED else {}),
-    }
+    step = {"resolution_mm": round(10.0**-decimals, decimals)} if 0 < decimals < PADDED else {}
+    return {**channel, **line, **step}
 
 
 def encoder_keys(nodes: tuple[encoders.FoundNode, ...]) -> Document:

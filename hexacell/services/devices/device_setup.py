@@ -51,8 +51,6 @@ def _with_encoder_files(settings: CellSettings, folder: Path) -> CellSettings:
         changes["dbc"] = described.model_copy(update={"file": str(folder / described.file)})
     if eds is not None:
         changes["eds"] = str(folder / eds)
-    if not changes:
-        return settings
     return settings.model_copy(update={"encoders": settings.encoders.model_copy(update=changes)})
 
 

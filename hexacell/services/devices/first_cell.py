@@ -49,7 +49,6 @@ class CellAnswer:
 
     Attributes:
         path: where the answer belongs.
-        default: the answer that is proposed.
         read: makes the value at the path of it, or raises ``ValueError`` with what is expected.
         put: enters an answer with more than this one value into a document, instead.
     """

@@ -3,14 +3,12 @@
 Each cell that shares an archive puts this there, and any computer can read of all.
 """
 
-from __future__ import annotations
-
 import socket
 from collections.abc import Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from pydantic import ValidationError
 
@@ -22,9 +20,6 @@ from hexacell.services.history.drift_history import DriftHistory, drift_history
 from hexacell.services.history.past_runs import past_runs
 from hexacell.services.history.run_index import PastRun, RunIndex, RunSummary
 from hexacell.verdict.decision import Verdict
-
-if TYPE_CHECKING:
-    from hexacell.runs.archive import SharedDocument
 
 CLOCKS_DIFFER = timedelta(minutes=5)
 """Largest difference of the clocks of computers that share a folder."""
@@ -95,11 +90,7 @@ class CellStatus:
 
 
 def cell_status(cell: Cell) -> CellStatus:
-    """The status of a cell, from its run folders.
-
-    Raises:
-        FileError: the controller's config, or the folder of the runs, cannot be read.
-    """
+    """The status of a cell, from its run folders; raises as :func:`.past_runs`."""
     index = RunIndex(cell)
     runs = [run for run in past_runs(cell, index) if run.summary.ended is not None]
     latest = next(iter(runs), None)
@@ -146,11 +137,7 @@ class FleetRun:
 
 
 def publish_status(status: CellStatus) -> None:
-    """Put the status of a cell into the archive that it shares, if it shares one.
-
-    Raises:
-        ArchiveUnavailable: it cannot be written.
-    """
+    """Put the status of a cell into the archive that it shares, if any; raises ``ArchiveUnavailable``."""
     cell = status.cell
     if cell.settings.archive.url is None:
         return
@@ -168,23 +155,15 @@ def summary_of(run: PastRun | None) -> RunSummary:
 
 
 def fleet_cells(url: str) -> tuple[FleetCell, ...]:
-    """All cells of an archive, by name; without those that a newer program has put there.
-
-    Raises:
-        ArchiveUnavailable: it cannot be read.
-    """
+    """All cells of an archive, by name; raises ``ArchiveUnavailable``."""
     return tuple(cell for _, cell in _shared(url, DocumentKind.CELL, FleetCell))
 
 
 def fleet_runs(url: str) -> tuple[FleetRun, ...]:
-    """The runs of all cells of an archive, the newest first.
-
-    Raises:
-        ArchiveUnavailable: it cannot be read.
-    """
+    """The runs of all cells of an archive, the newest first; raises ``ArchiveUnavailable``."""
     found = [
-        FleetRun(one.cell, one.place.partition(":")[0], one.run, summary)
-        for one, summary in _shared(url, DocumentKind.SUMMARY, RunSummary)
+        FleetRun(cell, place.partition(":")[0], run, summary)
+        for (cell, place, run), summary in _shared(url, DocumentKind.SUMMARY, RunSummary)
     ]
     never = datetime.min.replace(tzinfo=UTC)
     return tuple(
@@ -192,10 +171,12 @@ def fleet_runs(url: str) -> tuple[FleetRun, ...]:
     )
 
 
-def _shared(url: str, kind: DocumentKind, model: type[Model]) -> Iterator[tuple[SharedDocument, Model]]:
-    """What the cells of an archive share, without what a newer program has written."""
+def _shared(
+    url: str, kind: DocumentKind, model: type[Model]
+) -> Iterator[tuple[tuple[str, str, str], Model]]:
+    """What cells share, of which cell, place and run; without what a newer program has written."""
     from hexacell.runs.archive import shared_documents  # noqa: PLC0415 - SQLAlchemy only where used
 
-    for document in shared_documents(url, kind):
+    for cell, place, run, content in shared_documents(url, kind):
         with suppress(ValidationError):
-            yield document, model.model_validate_json(document.content)
+            yield (cell, place, run), model.model_validate_json(content)

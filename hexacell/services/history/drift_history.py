@@ -1,20 +1,15 @@
 """The watch over all runs of a cell: what changed, when, and how near the sums are to an alarm."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
-from typing import TYPE_CHECKING
 
 from hexacell.cell.loader import Cell
+from hexacell.drift.drift_watch import StepAlarm, watch_runs
 from hexacell.kinematics.parameters import GeometricParameter
 from hexacell.runs.run_folder import DocumentKind, RunFolder
 from hexacell.services.history.run_index import EvidenceDocument, RunIndex
 from hexacell.storage.atomic_files import sha256
-
-if TYPE_CHECKING:
-    from hexacell.drift.drift_watch import StepAlarm
 
 MOVING_ON_RUNS = 30
 """Runs within which a leg that alarms again is said to have moved on."""
@@ -76,7 +71,6 @@ def drift_history(cell: Cell, index: RunIndex | None = None) -> DriftHistory:
         return DriftHistory((), (), (), ())
     # Imported here: a cell without runs needs nothing of the watch.
     from hexacell.checks.change_alarm import machine_causes  # noqa: PLC0415
-    from hexacell.drift.drift_watch import watch_runs  # noqa: PLC0415
     from hexacell.robot.model import robot_of  # noqa: PLC0415
 
     causes = machine_causes(robot_of(cell), len(runs[-1].evidence.weighted))

@@ -77,11 +77,7 @@ def require_sound(
 
 
 def read_sound(folder: RunFolder, settings: CellSettings) -> tuple[Sequence[Entry], RunState]:
-    """The journal of a run and the state after it, for its numbers alone.
-
-    Raises:
-        FileError: the journal cannot be read, or cannot be of a run of such a cell.
-    """
+    """The journal of a run and the state after it, for its numbers alone; raises ``FileError``."""
     entries = read_entries(folder.journal)
     history = (entry.event for entry in entries)
     return entries, require_sound(history, settings, folder.journal, follows_plan=False)

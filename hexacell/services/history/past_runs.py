@@ -120,11 +120,7 @@ class Retention:
 
 
 def retention(cell: Cell, days: float, index: RunIndex | None = None) -> Retention:
-    """What becomes of the runs that ended more than ``days`` ago; nothing is deleted.
-
-    Raises:
-        FileError: the controller's config, or the folder of the runs, cannot be read.
-    """
+    """What becomes of runs that ended more than ``days`` ago; nothing is deleted. Raises ``FileError``."""
     before = datetime.now(UTC) - timedelta(days=days)
     old = [run for run in past_runs(cell, index) if run.summary.ended is None or run.summary.ended < before]
     reasons = [(run, reason_to_keep(run)) for run in old]

@@ -93,11 +93,8 @@ def with_changes(cell: Cell, found: Iterable[DeviceIdentity]) -> tuple[DeviceIde
             before, after = getattr(known.get(now.name), field, None), getattr(now, field)
             if before and before != after:
                 changes.append(f"{word} {after or 'none'}, which was {before}")
-        if changes:
-            remark = f"since the run {run}: {', '.join(changes)}"
-            remarked.append(replace(now, remark="; ".join(filter(None, (now.remark, remark)))))
-        else:
-            remarked.append(now)
+        remark = f"since the run {run}: {', '.join(changes)}" if changes else ""
+        remarked.append(replace(now, remark="; ".join(filter(None, (now.remark, remark)))))
     return tuple(remarked)
 
 

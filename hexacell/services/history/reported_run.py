@@ -38,6 +38,7 @@ class ReportedRun:
     folder: RunFolder
     settings: CellSettings
     state: RunState
+    started: events.RunStarted
     began: datetime
     ended: datetime
     document: Mapping[str, Any]
@@ -47,12 +48,6 @@ class ReportedRun:
     def name(self) -> str:
         """The name of its folder."""
         return self.folder.path.resolve().name
-
-    @property
-    def started(self) -> events.RunStarted:
-        """The first event."""
-        assert self.state.started is not None  # noqa: S101 - checked when it is read
-        return self.state.started
 
     @property
     def identifier(self) -> str:
@@ -84,6 +79,7 @@ def reported_run(run: Path) -> ReportedRun:
         folder=folder,
         settings=settings,
         state=state,
+        started=state.started,
         began=entries[0].at,
         ended=entries[-1].at,
         document=_document(folder.result),

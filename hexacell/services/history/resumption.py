@@ -6,7 +6,6 @@ to again.
 """
 
 from collections.abc import Iterator
-from datetime import datetime
 from itertools import chain
 from pathlib import Path
 
@@ -15,14 +14,15 @@ import numpy as np
 from hexacell.cell.loader import Cell
 from hexacell.config import layout
 from hexacell.config.change import BEFORE, RECEIPT, ConfigChange, Receipt, kept_paths
-from hexacell.errors import FileError, HexacellError, UsageError
+from hexacell.errors import FileError, UsageError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import SAME_FRAMES, Pose, PoseBatch
 from hexacell.robot.model import Robot
 from hexacell.robot.stated import stated_limits
 from hexacell.runs.run_folder import RunFolder, find_run, run_folders, runs_folder
 from hexacell.services.history.recorded_cell import started_robot
-from procedures.journal.journal import RESTORE, read_entries
+from hexacell.services.history.run_summary import run_summary
+from procedures.journal.journal import RESTORE
 from procedures.resources.controller_config import PROVISIONAL_FOLDER
 from procedures.run.keys import SixNumbers
 from procedures.run.state import RunState
@@ -40,25 +40,14 @@ def run_to_resume(cell: Cell, named: str) -> RunFolder:
     """
     if named != LATEST:
         return find_run(cell, named)
-    last_events = {run: at for run in run_folders(cell) if (at := _interrupted_at(run)) is not None}
+    found = {run: run_summary(run) for run in run_folders(cell)}
+    last_events = {run: one.ended for run, one in found.items() if one.ended and not one.is_over}
     if not last_events:
         raise UsageError(
             "no run of this cell was interrupted",
             action=f"Name one; the cell's runs are in {runs_folder(cell)}",
         )
     return max(last_events, key=last_events.__getitem__)
-
-
-def _interrupted_at(run: RunFolder) -> datetime | None:
-    """When something happened last in a run that is not over; None where it is, or cannot be read."""
-    if not run.journal.is_file():
-        return None
-    try:
-        entries = read_entries(run.journal)
-    except HexacellError:
-        return None
-    is_over = any(isinstance(entry.event, events.Ended) for entry in entries)
-    return entries[-1].at if entries and not is_over else None
 
 
 def require_own_run(cell: Cell, folder: RunFolder, state: RunState, *, is_resumed: bool = True) -> None:

@@ -4,20 +4,19 @@ What is missing there, or older than its folder, is read from the folder and kep
 be used at all, everything is read from the folders.
 """
 
-from __future__ import annotations
-
 import base64
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import closing
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from datetime import datetime
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from hexacell.cell.fields import Frozen
 from hexacell.cell.loader import Cell
+from hexacell.drift.run_evidence import RunEvidence
 from hexacell.kinematics.rotations import Array
 from hexacell.runs.run_folder import (
     ArchiveUnavailable,
@@ -28,10 +27,6 @@ from hexacell.runs.run_folder import (
     runs_folder,
 )
 from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy
-
-if TYPE_CHECKING:
-    from hexacell.drift.run_evidence import RunEvidence
-    from hexacell.runs.archive import Archive
 
 BATCH = 100
 """Number of runs stored at once, so that an interrupted reading of thousands of folders is not lost."""
@@ -131,8 +126,6 @@ class EvidenceDocument(Frozen):
     @property
     def evidence(self) -> RunEvidence:
         """The evidence that the document holds."""
-        from hexacell.drift.run_evidence import RunEvidence  # noqa: PLC0415 - only where runs are watched
-
         weighted = _doubles(self.weighted)
         upper = np.zeros((len(weighted), len(weighted)))
         upper[np.triu_indices(len(weighted))] = _doubles(self.information)
@@ -174,38 +167,29 @@ class RunIndex:
         from hexacell.runs.archive import Archive  # noqa: PLC0415 - SQLAlchemy only where it is read
 
         with closing(Archive(self._folder, self._cell.settings.name, self._url)) as archive:
-            known = self._known(archive, kind, stamps)
+            known: Mapping[str, StampedDocument] = {}
+            with self._warned():
+                known = archive.documents(kind)
+                archive.forget([name for name in known if name not in stamps])
             found = {name: _decoded(model, known.get(name), stamp) for name, stamp in wanted.items()}
             unknown = [name for name, one in found.items() if one is _UNKNOWN]
             for start in range(0, len(unknown), BATCH):
                 batch = unknown[start : start + BATCH]
                 fresh = {name: read(RunFolder(self._folder / name)) for name in batch}
-                self._keep(archive, kind, {name: _encoded(fresh[name], stamps[name]) for name in batch})
+                if not self._has_warned:
+                    with self._warned():
+                        archive.store(kind, {name: _kept(fresh[name], stamps[name]) for name in batch})
                 found |= fresh
         return {name: one for name, one in found.items() if isinstance(one, model)}
 
-    def _known(
-        self, archive: Archive, kind: DocumentKind, stamps: Mapping[str, str]
-    ) -> Mapping[str, StampedDocument]:
-        """What the archive has; runs whose folders are gone are dropped from it."""
+    @contextmanager
+    def _warned(self) -> Iterator[None]:
+        """Within this context an archive that cannot be used is a warning, and nothing is kept any more."""
         try:
-            known = archive.documents(kind)
-            archive.forget([name for name in known if name not in stamps])
+            yield
         except ArchiveUnavailable as error:
-            self._give_up(error)
-            return {}
-        return known
-
-    def _keep(self, archive: Archive, kind: DocumentKind, documents: Mapping[str, StampedDocument]) -> None:
-        if not self._has_warned:
-            try:
-                archive.store(kind, documents)
-            except ArchiveUnavailable as error:
-                self._give_up(error)
-
-    def _give_up(self, error: ArchiveUnavailable) -> None:
-        self._has_warned = True
-        self._warn(str(error))
+            self._has_warned = True
+            self._warn(str(error))
 
 
 _UNKNOWN = object()
@@ -221,7 +205,7 @@ def _decoded(model: type[Document], kept: StampedDocument | None, stamp: str) ->
         return _UNKNOWN
 
 
-def _encoded(document: BaseModel | None, stamp: str) -> StampedDocument:
+def _kept(document: BaseModel | None, stamp: str) -> StampedDocument:
     content = NOTHING if document is None else document.model_dump_json().encode()
     return StampedDocument(stamp, content)
 

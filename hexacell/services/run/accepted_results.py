@@ -1,7 +1,6 @@
 """The last accepted result of a cell: what is known of the geometry that its controller runs with."""
 
 from datetime import datetime
-from pathlib import Path
 
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.loader import Cell
@@ -30,7 +29,23 @@ def last_accepted_result(cell: Cell) -> AcceptedResult | None:
     written = fingerprint(*cell.config_paths)
     found = {run: one for run in run_folders(cell) if (one := _accepted(cell, run, written)) is not None}
     newest = max(found, key=lambda run: found[run][0], default=None)
-    return None if newest is None else _result(cell, newest.path, *found[newest])
+    if newest is None:
+        return None
+    at, state, result = found[newest]
+    terms = tuple(one for one in result.terms if one.is_taken)
+    readings = [sample.reading for sample in state.samples(Phase.IDENTIFY)]
+    return AcceptedResult(
+        run=str(newest.path),
+        at=at,
+        covariance=result.covariance,
+        effects=_effects(cell, state),
+        identified=result.geometry if terms else None,
+        terms=terms,
+        length=_length(state),
+        leg_temperatures_c=(
+            result.holds_at_c or mean_leg_temperatures(cell.settings.thermometers, readings)
+        ),
+    )
 
 
 def _accepted(
@@ -66,25 +81,6 @@ def _is_accepted(state: RunState, *, is_applied_later: bool) -> bool:
     holds = verification is not None and all(test.passed for test in verification.tests)
     is_kept = state.accepted is not None and state.accepted.by is not None
     return holds and (is_kept or is_applied_later)
-
-
-def _result(
-    cell: Cell, path: Path, at: datetime, state: RunState, result: IdentificationResult
-) -> AcceptedResult:
-    terms = tuple(one for one in result.terms if one.is_taken)
-    readings = [sample.reading for sample in state.samples(Phase.IDENTIFY)]
-    return AcceptedResult(
-        run=str(path),
-        at=at,
-        covariance=result.covariance,
-        effects=_effects(cell, state),
-        identified=result.geometry if terms else None,
-        terms=terms,
-        length=_length(state),
-        leg_temperatures_c=(
-            result.holds_at_c or mean_leg_temperatures(cell.settings.thermometers, readings)
-        ),
-    )
 
 
 def _length(state: RunState) -> LengthResult | None:

@@ -15,7 +15,7 @@ from hexacell.config.pending_write import held_config
 from hexacell.errors import FileError, HexacellError, UsageError, flatten_errors
 from hexacell.results.result import AcceptedResult
 from hexacell.robot.model import Robot, robot_of
-from hexacell.runs.run_folder import RunFolder, runs_folder
+from hexacell.runs.run_folder import RunFolder, runs_folder, unused
 from hexacell.services.design_facts import require_design
 from hexacell.services.devices.device_setup import Connected, device_addresses, open_devices
 from hexacell.services.history.journal_soundness import require_sound
@@ -187,7 +187,7 @@ async def _run(
     finally:
         # The trace only helps to find faults: whether it can be kept does not decide how a run ends.
         with suppress(FileError):
-            write_own(folder.new_wire(), connected.trace.text().encode(errors="backslashreplace"))
+            write_own(unused(folder.wire), connected.trace.text().encode(errors="backslashreplace"))
 
 
 def run_started(

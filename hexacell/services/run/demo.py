@@ -8,7 +8,6 @@ from pathlib import Path
 from hexacell.cell.bundled import CONTROLLER, bundled_config
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.passwords import password_path
-from hexacell.cell.robot import FurtherFileSettings
 from hexacell.errors import FileError, UsageError
 from hexacell.runs.cell_lock import cell_lock, lock_path
 from hexacell.runs.run_folder import RunFolder, runs_folder
@@ -26,11 +25,7 @@ RUN = "demo"
 
 
 def require_simulation(cell: Cell) -> Cell:
-    """Return a cell, once it is certain that it needs no devices.
-
-    Raises:
-        UsageError: it is a real cell.
-    """
+    """Return a cell, once it is certain that it needs no devices; raises ``UsageError``."""
     if cell.settings.simulation is None:
         raise UsageError("there is no [simulation] in it: this is a real cell", subject=cell.path)
     return cell
@@ -49,18 +44,17 @@ def served_cell(cell: Cell) -> Iterator[str]:
             paths["taught"] = str(cell.taught_path.resolve())
         if (passwords := password_path(settings.controller, cell.path.parent)) is not None:
             paths["password_file"] = str(passwords.resolve())
-        further = {"further_files": tuple(_absolute_files(cell))}
-        controller = settings.controller.model_copy(update=paths | further)
+        files = zip(
+            settings.controller.further_files, cell.config_paths[1:], cell.taught_paths[1:], strict=True
+        )
+        further = tuple(
+            one.model_copy(
+                update={"config": str(config.resolve()), "taught": one.taught and str(taught.resolve())}
+            )
+            for one, config, taught in files
+        )
+        controller = settings.controller.model_copy(update=paths | {"further_files": further})
         yield dump(settings.model_copy(update={"controller": controller}))
-
-
-def _absolute_files(cell: Cell) -> Iterator[FurtherFileSettings]:
-    files = zip(
-        cell.settings.controller.further_files, cell.config_paths[1:], cell.taught_paths[1:], strict=True
-    )
-    for one, config, taught in files:
-        paths = {"config": str(config.resolve()), "taught": one.taught and str(taught.resolve())}
-        yield one.model_copy(update=paths)
 
 
 def prepare_demo(folder: Path, config_name: str) -> RunRequest:

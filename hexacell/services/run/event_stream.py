@@ -6,7 +6,6 @@ The run never waits for who reads them. A target that cannot take a line is give
 import errno
 import os
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 
 from hexacell.errors import UsageError
@@ -29,7 +28,14 @@ class EventStream:
     def __init__(self, target: OutputFile, warn: Callable[[str], None]) -> None:
         self._target = target.path
         self._warn = warn
-        self._descriptor: int | None = _opened(target)
+        self._descriptor: int | None = None
+        try:
+            self._descriptor = target.open_stream(waits=False)
+        except OSError as error:
+            if error.errno == errno.ENXIO and target.path.is_fifo():
+                action = "Start its reader first"
+                raise UsageError("nobody reads this pipe", subject=target.path, action=action) from error
+            raise os_error_to_file_error("events cannot be written", target.path, error) from error
 
     def listener(self, journal: Path) -> Listener:
         """A listener for a run with this journal; the file need not exist yet."""
@@ -65,14 +71,3 @@ class EventStream:
                 if taken < len(data):
                     raise BlockingIOError(errno.EAGAIN, "its reader is too slow")
         return copied
-
-
-def _opened(target: OutputFile) -> int:
-    try:
-        return target.open_stream(waits=False)
-    except OSError as error:
-        with suppress(OSError):
-            if target.path.is_fifo():
-                action = "Start its reader first"
-                raise UsageError("nobody reads this pipe", subject=target.path, action=action) from error
-        raise os_error_to_file_error("events cannot be written", target.path, error) from error

@@ -132,11 +132,7 @@ def deliver(
     longest_s: float = LONGEST_ATTEMPT_S,
     pause: Callable[[float], object] = time.sleep,
 ) -> None:
-    """Deliver a notice, at once or at another attempt after a ``pause``, s.
-
-    Raises:
-        NoticeUndelivered: with the reason of the last attempt.
-    """
+    """Deliver a notice, at once or later after a ``pause``, s; raises ``NoticeUndelivered``."""
     for pause_s in (*PAUSES_S, None):
         try:
             _attempt(address, notice, longest_s)
@@ -202,7 +198,9 @@ def post_to_webhook(address: NoticeAddress, notice: Notice, timeout_s: float) ->
         raise NoticeUndelivered(f"the server answers {error.code}") from error
     except (OSError, HTTPException, ValueError) as error:
         reason = error.reason if isinstance(error, urllib.error.URLError) else error
-        raise NoticeUndelivered(address.masked(_words(reason))) from error
+        no_answer = "the server does not answer" if isinstance(reason, TimeoutError) else None
+        words = no_answer or getattr(reason, "strerror", None) or str(reason)
+        raise NoticeUndelivered(address.masked(words)) from error
 
 
 def _opener(address: NoticeAddress) -> urllib.request.OpenerDirector:
@@ -228,12 +226,6 @@ def _request(address: NoticeAddress, notice: Notice) -> urllib.request.Request:
         headers["Authorization"] = f"Basic {b64encode(login).decode()}"
     # Only http and https come here: the scheme chose this sender.
     return urllib.request.Request(address.url, notice.model_dump_json().encode(), headers)  # noqa: S310
-
-
-def _words(reason: object) -> str:
-    if isinstance(reason, TimeoutError):
-        return "the server does not answer"
-    return (reason.strerror if isinstance(reason, OSError) else None) or str(reason)
 
 
 if TYPE_CHECKING:

@@ -70,11 +70,7 @@ class NoticeOutbox:
         return tuple(sorted(found, key=lambda one: (one.notice.at, one.notice.id, one.to)))
 
     def drop_old(self, now: datetime) -> int:
-        """Give up what is too old or too much, the oldest first; gives how many.
-
-        Raises:
-            FileError: they cannot be removed.
-        """
+        """Give up what is too old or too much, the oldest first; gives how many; raises ``FileError``."""
         waiting = self.pending()
         kept = [one for one in waiting if one.notice.at > now - LONGEST_KEPT][-MOST_KEPT:]
         for one in waiting:
@@ -122,8 +118,6 @@ Deliver = Callable[[NoticeAddress, Notice], None]
 
 LONGEST_NOTIFYING_S = 60.0
 """Longest time that a run waits for its notices, s; what is not delivered then waits for the next run."""
-
-OTHER_PROCESS = "another process is sending at this moment"
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,7 +188,8 @@ def _send_all(
     try:
         with outbox.held() as is_ours:
             if not is_ours:
-                return NotifyOutcome((Delivery("the outbox", 0, 0, OTHER_PROCESS),))
+                problem = "another process is sending at this moment"
+                return NotifyOutcome((Delivery("the outbox", 0, 0, problem),))
             for pending in (*outbox.pending(), *unkept):
                 if pending.to in known:  # others are no longer notified; theirs wait until they are too old
                     queues[pending.to].append(pending)

@@ -28,7 +28,6 @@ class ScheduledRun:
 
     Attributes:
         cell: the cell file, absolute.
-        name: of the cell.
         program: the words that start hexacell, absolute.
         mode: ``check``, ``quick`` or ``optimise``.
         hour, minute: when it begins, in the computer's time zone.
@@ -58,9 +57,7 @@ class ScheduledRun:
 
     @property
     def words_afterwards(self) -> tuple[str, ...]:
-        """The command that writes the metrics; empty without."""
-        if self.metrics is None:
-            return ()
+        """The command that writes the metrics."""
         return (*self.program, "status", str(self.cell), "--metrics", str(self.metrics))
 
     @property
@@ -71,11 +68,7 @@ class ScheduledRun:
 
 
 def time_of_day(text: str) -> tuple[int, int]:
-    """Hour and minute.
-
-    Raises:
-        UsageError: it is no time of day.
-    """
+    """Hour and minute; raises ``UsageError``."""
     if (found := _TIME.fullmatch(text)) is None:
         raise UsageError(f"'{text}' is no time of day", action="Write it as 02:30")
     return int(found[1]), int(found[2])
@@ -134,12 +127,6 @@ def _unit(template: str, run: ScheduledRun, **values: object) -> str:
     )
     environment.filters |= {"plain": _plain, "quoted": _quoted, "command": _command}
     return environment.get_template(template).render(mark=MARK, run=run, stopping_s=STOPPING_S, **values)
-
-
-def cell_of(unit_text: str) -> Path | None:
-    """The cell file that a unit was written for; None if `hexacell schedule` did not write it."""
-    first = unit_text.split("\n", 1)[0]
-    return Path(first.removeprefix(MARK)) if first.startswith(MARK) else None
 
 
 def _plain(text: object) -> str:

@@ -15,8 +15,8 @@ from hexacell.cell.operation import DAY_MINUTES
 from hexacell.errors import FileError, UsageError
 from hexacell.python_process import python_command
 from hexacell.services.unattended.scheduled_run import (
+    MARK,
     ScheduledRun,
-    cell_of,
     service_text,
     time_of_day,
     timer_text,
@@ -170,10 +170,12 @@ def _place(folder: Path | None) -> tuple[Path, bool]:
 
 
 def _cell_of(path: Path) -> Path | None:
+    """The cell file that a unit was written for; None if `hexacell schedule` did not write it."""
     try:
-        return cell_of(atomic_files.read_text(path))
+        first = atomic_files.read_text(path).split("\n", 1)[0]
     except FileError:
         return None
+    return Path(first.removeprefix(MARK)) if first.startswith(MARK) else None
 
 
 def _require_ours(path: Path, cell: Path) -> None:

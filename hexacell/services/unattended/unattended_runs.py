@@ -27,11 +27,7 @@ def local_now() -> datetime:
 
 
 def refuse_quiet_hours(settings: CellSettings, at: datetime) -> None:
-    """Refuse a run that would begin in quiet hours.
-
-    Raises:
-        OutOfTime: names their end.
-    """
+    """Refuse a run that would begin in quiet hours; raises ``OutOfTime``."""
     if (until := quiet_until(settings.unattended, at)) is not None:
         raise OutOfTime(
             f"these are quiet hours of the cell, until {until:%H:%M}: no run begins without a person",

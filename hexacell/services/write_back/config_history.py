@@ -68,38 +68,26 @@ class ConfigHistory:
 
 
 def config_history(cell: Cell) -> ConfigHistory:
-    """Every write into the config of a cell that its runs know of.
-
-    Raises:
-        FileError: the records cannot be read.
-    """
+    """Every write into the config of a cell that its runs know of; raises ``FileError``."""
     folder = runs_folder(cell)
     records, damaged = read_records(folder)
-    runs: dict[str, _Run] = {}
+    runs: dict[str, tuple[RunState, list[WriteRecord]]] = {}
     for receipt in receipts_of(cell):
+        run = RunFolder(receipt.backup_folder)
         with suppress(HexacellError):  # runs that cannot be read are left out
-            run = _read(RunFolder(receipt.backup_folder), receipt)
-            runs[run.name] = run
+            runs[run.name] = _read(run, receipt)
     found: list[ConfigWrite] = []
     for name in sorted({*runs, *(record.run for record in records)}):
-        run, own = runs.get(name) or _Run(name), [record for record in records if record.run == name]
-        every = [*((one, True) for one in own), *((one, False) for one in _unrecorded(run.noted, own))]
+        state, noted = runs.get(name, (RunState(), []))  # nothing is known of one that is deleted
+        own = [record for record in records if record.run == name]
+        line = state.judged.line if state.judged else ""
+        every = [*((one, True) for one in own), *((one, False) for one in _unrecorded(noted, own))]
         for record, is_recorded in every:
-            verdict = (run.verdict, run.line) if record.kind in _OF_THE_RESULT else (None, "")
+            verdict = (state.verdict, line) if record.kind in _OF_THE_RESULT else (None, "")
             found.append(ConfigWrite(record, is_recorded, *verdict))
     # Reversed only when sorted: of two in the same millisecond the later one stays the newer.
     oldest_first = sorted(found, key=lambda one: _in_milliseconds(one.record.at))
     return ConfigHistory(tuple(reversed(oldest_first)), folder / RECORDS, damaged)
-
-
-@dataclass(frozen=True, slots=True)
-class _Run:
-    """What the folder of a run says of its writes; nothing where it is deleted."""
-
-    name: str
-    noted: tuple[WriteRecord, ...] = ()
-    verdict: Verdict | None = None
-    line: str = ""
 
 
 def _unrecorded(noted: Sequence[WriteRecord], records: Sequence[WriteRecord]) -> list[WriteRecord]:
@@ -126,7 +114,8 @@ def _in_milliseconds(at: datetime) -> datetime:
     return at.replace(microsecond=at.microsecond // 1000 * 1000)
 
 
-def _read(run: RunFolder, receipt: Receipt) -> _Run:
+def _read(run: RunFolder, receipt: Receipt) -> tuple[RunState, list[WriteRecord]]:
+    """The state of a run, and what its folder says of its writes."""
     state, noted = RunState(), list[WriteRecord]()
     for entry in read_entries(run.journal):
         match entry.event:
@@ -138,8 +127,7 @@ def _read(run: RunFolder, receipt: Receipt) -> _Run:
         state = apply(state, entry.event)
     if (approval := later_approval(run)) is not None:
         noted.append(_record(WriteKind.APPLIED, approval.at, approval.by, run, receipt))
-    line = state.judged.line if state.judged else ""
-    return _Run(run.name, tuple(noted), state.verdict, line)
+    return state, noted
 
 
 def _record(

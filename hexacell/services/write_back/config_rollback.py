@@ -23,7 +23,6 @@ class ConfigRollback:
     """What a rollback did.
 
     Attributes:
-        paths: the files of the config.
         undone: the run whose geometry the config had; None where it had that from before all runs.
         restored: the files in a run folder that the config is now a copy of.
         change: the change of the text, as a unified diff; empty where nothing had to be written.

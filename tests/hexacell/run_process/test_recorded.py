@@ -95,7 +95,8 @@ async def test_the_whole_run_is_told_first(tmp_path) -> None:
 
 
 async def test_steps_go_on_event_by_event(tmp_path) -> None:
-    run = RecordedRun(recorded(tmp_path), 1)
+    run = RecordedRun(recorded(tmp_path))
+    run.jump(1)
     messages = run.messages()
     assert history(await told(messages)) == [STARTED]
     run.step()
@@ -117,15 +118,16 @@ async def test_back_in_time_the_run_is_told_anew(tmp_path) -> None:
 
 
 async def test_the_cursor_stops_at_both_ends(tmp_path) -> None:
-    run = RecordedRun(recorded(tmp_path), 2)
+    run = RecordedRun(recorded(tmp_path))
+    messages = run.messages()
     for wanted, reached in ((-5, 1), (0, 1), (LAST + 7, LAST)):
         run.jump(wanted)
-        assert run.sequence == reached
-    assert cursor(await told(run.messages())).sequence == LAST
+        assert cursor(await told(messages)).sequence == reached
 
 
 async def test_questions_to_place_gauges_are_told(tmp_path) -> None:
-    run = RecordedRun(recorded(tmp_path), 2)
+    run = RecordedRun(recorded(tmp_path))
+    run.jump(2)
     messages = run.messages()
     asked = await told(messages)
     [placement] = [
@@ -143,7 +145,8 @@ async def test_questions_to_place_gauges_are_told(tmp_path) -> None:
 @pytest.mark.parametrize("restarted", [False, True])
 async def test_it_advances_by_itself_as_fast_as_wanted(tmp_path, restarted: bool) -> None:
     clock = ManualClock()
-    run = RecordedRun(recorded(tmp_path, 0.0, 10.0, 30.0, 900.0, restarted=restarted), 1, clock)
+    run = RecordedRun(recorded(tmp_path, 0.0, 10.0, 30.0, 900.0, restarted=restarted), clock)
+    run.jump(1)
     messages = run.messages()
     await told(messages)
     run.set_speed(4.0)
@@ -160,7 +163,8 @@ async def test_it_advances_by_itself_as_fast_as_wanted(tmp_path, restarted: bool
 
 async def test_it_stands_still_at_its_end(tmp_path) -> None:
     clock = ManualClock()
-    run = RecordedRun(recorded(tmp_path), LAST - 1, clock)
+    run = RecordedRun(recorded(tmp_path), clock)
+    run.jump(LAST - 1)
     run.set_speed(1.0)
     messages = run.messages()
     await told(messages)

@@ -9,7 +9,7 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.errors import ExitCode, UsageError
 from hexacell.runs import run_folder
-from hexacell.runs.run_folder import RunFolder, find_run, new_run, runs_folder
+from hexacell.runs.run_folder import RunFolder, find_run, new_run, runs_folder, unused
 
 
 @pytest.fixture
@@ -59,7 +59,7 @@ def test_a_folder_that_holds_a_run_takes_no_other(cell: Cell, folder: RunFolder)
 def test_every_part_of_a_run_has_a_wire_trace_of_its_own(cell: Cell, folder: RunFolder) -> None:
     folder.create(cell)
     for name in ("wire", "wire-2", "wire-3"):
-        path = folder.new_wire()
+        path = unused(folder.wire)
         assert path == folder.path / name
         path.touch()
 

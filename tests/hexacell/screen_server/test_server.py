@@ -123,7 +123,7 @@ async def test_without_a_password_it_is_for_its_user_alone(serving, monkeypatch)
             403
         }
         monkeypatch.setattr(os, "getuid", lambda: user)
-        monkeypatch.setattr(access, "_CONNECTIONS", ())
+        monkeypatch.setattr(access, "kernel_connections", tuple)
         assert await served.status("/") == 403, "who it is cannot be told"
 
 

@@ -66,7 +66,7 @@ def test_a_simulated_cell_is_served_while_the_context_lasts(make_cell) -> None:
         assert (settings.encoders.bus or {})["interface"] == "slcan"
         real = replace(cell, settings=settings)
         with device_addresses(real) as found:
-            assert found is settings
+            assert found == settings
 
 
 GAUGE = DeviceIdentity("x", "mux10", "MUX-10F 1.0", port="1-1.2")

@@ -15,8 +15,8 @@ from pydantic import ValidationError
 from hexacell.cell.operation import UnattendedSettings
 from hexacell.errors import UsageError
 from hexacell.services.unattended.scheduled_run import (
+    MARK,
     ScheduledRun,
-    cell_of,
     service_text,
     time_of_day,
     timer_text,
@@ -83,7 +83,8 @@ def test_any_path_is_one_argument(folder, file) -> None:
     found = settings_of(service_text(run, "robot", []))
     assert words_of(found["ExecStart"]) == list(run.words)
     assert found["WorkingDirectory"].replace("%%", "%") == str(run.cell.parent)
-    assert cell_of(service_text(run, None, [])) == cell_of(timer_text(run)) == run.cell
+    for text in (service_text(run, None, []), timer_text(run)):
+        assert text.startswith(f"{MARK}{run.cell}\n")
 
 
 def test_what_is_no_time_of_day_is_refused() -> None:

@@ -8,7 +8,6 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from socket import socket
 
 from hexacell.errors import HexacellError, UsageError
 from hexacell.run_process import messages
@@ -223,11 +222,6 @@ class Audience:
     def _send_control(self, client: _Client) -> None:
         changed = messages.ControlChanged(is_in_control=client is self._in_control, who=self._who)
         client.outbox.put(messages.message_line(changed))
-
-
-async def audience_server(audience: Audience, listener: socket) -> asyncio.Server:
-    """The server of a run, on a socket that listens."""
-    return await asyncio.start_unix_server(audience.serve, sock=listener, limit=messages.LONGEST_MESSAGE)
 
 
 def _name_of(user: int) -> str:

@@ -12,7 +12,7 @@ from hexacell.campaign.pose_list import pose_list_of
 from hexacell.errors import ExitCode, HexacellError
 from hexacell.plugins import plugin_failures_named
 from hexacell.run_process import messages
-from hexacell.run_process.audience import Audience, audience_server
+from hexacell.run_process.audience import Audience
 from hexacell.run_process.live_devices import RunDeviceWatch
 from hexacell.services.run.calibration_run import RunRequest, calibrate
 from procedures.calibration.calibration import expected_records
@@ -81,7 +81,8 @@ class RunHost:
 
         The run begins when the first client has come, and does not if none does.
         """
-        server = await audience_server(self._audience, listener)
+        serve, limit = self._audience.serve, messages.LONGEST_MESSAGE
+        server = await asyncio.start_unix_server(serve, sock=listener, limit=limit)
         try:
             await asyncio.wait_for(self._audience.first_came.wait(), FIRST_CLIENT_S)
         except TimeoutError:

@@ -90,7 +90,11 @@ class Startup:
             try:
                 await self._prepare((self.stated | granted) - theirs)
             except StartupNotPermitted as refusal:
-                granted |= await self._permitted(refusal, is_theirs=refusal.needed in theirs)
+                is_theirs = refusal.needed in theirs
+                question = ask_startup(refusal.needed, str(refusal), is_theirs=is_theirs)
+                if await self.operator.ask(question) != YES:
+                    raise Interruption(f"{refusal}, which was left as it is") from None
+                granted |= frozenset() if is_theirs else {refusal.needed}
             else:
                 return
 
@@ -104,12 +108,6 @@ class Startup:
                 raise
 
         await self.guards.prepare(order)
-
-    async def _permitted(self, refusal: StartupNotPermitted, *, is_theirs: bool) -> StartupActions:
-        """What a person permits; nothing where that person has done it."""
-        if await self.operator.ask(ask_startup(refusal.needed, str(refusal), is_theirs=is_theirs)) != YES:
-            raise Interruption(f"{refusal}, which was left as it is")
-        return frozenset() if is_theirs else frozenset({refusal.needed})
 
 
 _log = logging.getLogger(__name__)

@@ -46,7 +46,8 @@ def run_banner(picture: RunPicture, settings: CellSettings | None) -> Banner:
         word = "RECORDED" if picture.state.verdict is None else picture.state.verdict.upper()
         rest = "space plays, arrows step, + and - change the speed; nothing moves"
         urgency = verdict_urgency(picture.state.verdict)
-        return Banner(word, _capital(_recorded(picture)), _following(picture, settings), rest, urgency)
+        shown = _doing(picture) if picture.state.ended is None else picture.state.ended.line
+        return Banner(word, _capital(shown), _following(picture, settings), rest, urgency)
     if picture.status is Status.ENDED:
         return _ended(picture)
     rest = ". ".join(filter(None, (remaining(picture, settings), _watching(picture))))
@@ -60,10 +61,6 @@ def run_banner(picture: RunPicture, settings: CellSettings | None) -> Banner:
     elif picture.status is Status.FAULTED:
         word, action, urgency = "STOPPED", "Nothing to do: the robot is stopped", Urgency.ALARM
     return Banner(word, action, f"Next: {_following(picture, settings)}", rest, urgency)
-
-
-def _recorded(picture: RunPicture) -> str:
-    return picture.state.ended.line if picture.state.ended is not None else _doing(picture)
 
 
 def _ended(picture: RunPicture) -> Banner:

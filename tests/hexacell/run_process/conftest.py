@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from hexacell.run_process.audience import Audience, audience_server
+from hexacell.run_process.audience import Audience
 from hexacell.run_process.client import HostConnection, connect_to_run
 from hexacell.run_process.messages import ControlChanged, HostMessage, StatusChanged, message_line
 from hexacell.run_process.run_socket import listening_socket
@@ -103,7 +103,7 @@ def scripted_run(path: Path, monkeypatch: pytest.MonkeyPatch) -> MakeRun:
         monkeypatch.setattr("hexacell.run_process.audience.STUCK_S", stuck_s)
         with listening_socket(path) as listener:
             scripted = ScriptedRun(path)
-            server = await audience_server(scripted.audience, listener)
+            server = await asyncio.start_unix_server(scripted.audience.serve, sock=listener)
             yield scripted
             scripted.close()
             await scripted.audience.dismiss()

@@ -59,26 +59,26 @@ def listening_socket(path: Path) -> Iterator[socket.socket]:
             subject=path.parent,
             action="Remove it, or set XDG_RUNTIME_DIR to a folder of yours with mode 700",
         )
-    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    try:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
         with _alone_in(path.parent):
-            _bind(listener, path)
+            if is_served(path):
+                problem = "another process runs this cell"
+                raise CellBusy(problem, subject=path, action="See it with `hexacell tui`")
+            with os_errors("the socket of the run cannot be made", path):
+                path.unlink(missing_ok=True)  # of a process that was killed
+                os.fchmod(listener.fileno(), 0o600)
+                listener.bind(str(path))
+                listener.listen()
         try:
             yield listener
         finally:
             path.unlink(missing_ok=True)
-    finally:
-        listener.close()
 
 
 def is_served(path: Path) -> bool:
     """Whether a process listens there."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
-        try:
-            probe.connect(str(path))
-        except OSError:
-            return False
-    return True
+        return probe.connect_ex(str(path)) == 0
 
 
 def peer_of(connection: socket.socket) -> tuple[int, int]:
@@ -86,16 +86,6 @@ def peer_of(connection: socket.socket) -> tuple[int, int]:
     credentials = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size)
     process, user, _ = _PEER.unpack(credentials)
     return process, user
-
-
-def _bind(listener: socket.socket, path: Path) -> None:
-    if is_served(path):
-        raise CellBusy("another process runs this cell", subject=path, action="See it with `hexacell tui`")
-    with os_errors("the socket of the run cannot be made", path):
-        path.unlink(missing_ok=True)  # of a process that was killed
-        os.fchmod(listener.fileno(), 0o600)
-        listener.bind(str(path))
-        listener.listen()
 
 
 def _runtime_folder() -> Path:

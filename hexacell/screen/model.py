@@ -19,8 +19,7 @@ from hexacell.screen.workplace import Workplace
 from hexacell.services.history.run_index import PastRun
 from hexacell.services.robot_view import first_scene
 from hexacell.text.screens import banner, reviewing
-from hexacell.text.screens.cell_facts import cell_facts
-from hexacell.text.screens.devices import device_cards
+from hexacell.text.screens.devices import cell_facts, device_cards
 from hexacell.text.screens.measuring import (
     accuracy_plot,
     fault_view,

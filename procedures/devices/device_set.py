@@ -132,17 +132,9 @@ class Devices:
         several = (one if isinstance(one, tuple) else (one,) for one in found)
         return tuple(identity for some in several for identity in some if identity is not None)
 
-    async def read_gauges(
-        self, on_answer: Callable[[], object] = lambda: None
-    ) -> list[interfaces.GaugeReading]:
-        """One reading of each gauge, in the order of ``gauges``; ``on_answer`` is called at each."""
-
-        async def read(gauge: interfaces.Gauge) -> interfaces.GaugeReading:
-            reading = await self.live.gauge(gauge.name).of(gauge.read)
-            on_answer()
-            return reading
-
-        return await gather_errors("gauges cannot be read", [read(one.gauge) for one in self.gauges])
+    async def read_gauge(self, gauge: interfaces.Gauge) -> interfaces.GaugeReading:
+        """One reading of a gauge, which its driver repeats until it is sure."""
+        return await self.live.gauge(gauge.name).of(gauge.read)
 
     async def read_gauge_once(self, gauge: interfaces.Gauge) -> interfaces.GaugeReading:
         """One reading of a gauge, without repetition."""

@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Awaitable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from hexacell.clock import CellClock
 from hexacell.errors import DeviceError, HexacellError, consists_only_of, flatten_errors
 from hexacell.kinematics.rotations import Array
 from procedures.devices.device_set import Devices, gather_errors
+
+Result = TypeVar("Result")
 
 LEAST_WINDOWS = 3
 """So many windows' worth of readings are taken before giving up, however long they take."""
@@ -74,15 +76,14 @@ async def read_all(devices: Devices, clock: CellClock) -> DeviceSnapshot:
     """Read everything once: the gauges and a round of the encoders at the same time."""
     answered_s: list[float] = []
 
-    def note_answer() -> None:
+    async def timed(reading: Awaitable[Result]) -> Result:
+        value = await reading
         answered_s.append(clock.now())
+        return value
 
-    async def read_encoders() -> EncoderSample:
-        sample = await devices.read_encoders()
-        note_answer()
-        return sample
-
-    calls: list[Awaitable[Any]] = [devices.read_gauges(note_answer), read_encoders()]
+    readings = [timed(devices.read_gauge(one.gauge)) for one in devices.gauges]
+    calls: list[Awaitable[Any]] = [gather_errors("gauges cannot be read", readings)]
+    calls.append(timed(devices.read_encoders()))
     gauges, encoders = await gather_errors("devices cannot be read", calls)
     last_s = max(answered_s)
     return DeviceSnapshot(last_s, tuple(gauges), encoders, last_s - min(answered_s))

@@ -69,9 +69,12 @@ class Guards:
         self, moves: Sequence[tuple[Pose, float]], watched: WatchedSet, commanded: Callable[[], Array]
     ) -> None:
         """Move to poses, in s each; ``commanded`` gives the joint variables (6,) at the last of them."""
-        gauges = self._watched_gauges(watched)
-        pollers = self._pollers(controller=True, gauges=gauges)
-        limits = self._limits(zero_mm=watched.zero_mm)
+        zero_mm = watched.zero_mm
+        gauges: tuple[WatchedGauge, ...] = ()
+        if zero_mm is not None:
+            mounted = self.devices.gauges
+            gauges = tuple(WatchedGauge(self.devices, one, zero_mm[one.axis.index]) for one in mounted)
+        pollers, limits = self._pollers(controller=True, gauges=gauges), self._limits(zero_mm=zero_mm)
 
         async def go() -> EncoderSample:
             for target, duration_s in moves:
@@ -145,15 +148,6 @@ class Guards:
             encoders=polling.DevicePoller("encoders", devices.read_encoders) if encoders else None,
             controller=polling.DevicePoller("controller", watched.status) if controller else None,
             stop_input=polling.DevicePoller(STOP_LINE, devices.stop_reason),
-        )
-
-    def _watched_gauges(self, watched: WatchedSet) -> "tuple[WatchedGauge, ...]":
-        zero_mm = watched.zero_mm
-        if zero_mm is None or not watched.is_watched:
-            return ()
-        return tuple(
-            WatchedGauge(self.devices, mounted, zero_mm[mounted.axis.index])
-            for mounted in self.devices.gauges
         )
 
 

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from hexacell.cell.model import CellSettings
 from hexacell.run_process.messages import HostFailed, LiveSnapshot
 from hexacell.text.layout import error_with_u
+from hexacell.text.screens.measuring import remaining
 from hexacell.text.screens.questions import question_view
 from hexacell.text.screens.run_picture import RunPicture
-from hexacell.text.screens.time_left import remaining
 from hexacell.text.screens.views import Banner, ChecklistItem, Mark, Urgency
 from hexacell.text.verdict import teaching_line
 from hexacell.verdict.decision import Verdict

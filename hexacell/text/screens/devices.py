@@ -1,6 +1,9 @@
-"""The devices as they show now: a card each, a line for each gauge, and how gauges are to be placed."""
+"""A cell and its devices: what its file states, and what they show now: a card each, a line a gauge."""
+
+from collections.abc import Iterator
 
 from drivers.interfaces import ControllerStatus, EncoderSample
+from hexacell.cell.loader import Cell
 from hexacell.run_process.messages import GaugeSnapshot, LiveSnapshot, Shown
 from hexacell.text.screens.views import Card, Line, Urgency
 from procedures.run.keys import ThreeNumbers
@@ -15,6 +18,22 @@ OLD_S = 2.0
 """Silence of a device from which it is shown, s."""
 
 NOT_CONNECTED = "No device is connected."
+
+
+def cell_facts(cell: Cell) -> Iterator[str]:
+    """A line each: what there is, what is measured, and what must be reached."""
+    settings = cell.settings
+    controller, plan, limits = settings.controller, settings.identification, settings.acceptance
+    yield f"robot       {settings.robot.mechanism}"
+    yield f"controller  {controller.protocol}"
+    yield f"its config  {', '.join(one.name for one in cell.config_paths)}"
+    gauges = ", ".join(
+        f"{'+' if one.sign > 0 else '-'}{one.axis} {one.protocol}" for one in settings.gauges
+    )
+    yield f"gauges      {gauges}"
+    yield f"encoders    {settings.encoders.protocol}"
+    yield f"plan        {len(plan.points)} points, {plan.orientations} orientations each"
+    yield f"limit       {limits.position_mm:g} mm and {limits.orientation_deg:g} deg at the task poses"
 
 
 def device_cards(live: LiveSnapshot | None, later_s: float) -> tuple[Card, ...]:

@@ -280,13 +280,13 @@ class ScreenModel:
             case ScreenAction.EXCLUDE:
                 await self._readiness.toggle_exclusion(argument)
             case ScreenAction.COMPARE:
-                await self._history.compare(argument)
+                await self._history.ask(workplace.compare(argument))
             case ScreenAction.DRIFT:
-                await self._history.drift()
+                await self._history.ask(workplace.drift())
             case ScreenAction.ROLL_BACK:
-                return await self._history.roll_back(argument)
+                return await self._history.change_config(workplace.roll_back, argument)
             case ScreenAction.APPLY:
-                return await self._history.apply(argument)
+                return await self._history.change_config(workplace.apply, argument)
             case ScreenAction.OPEN:
                 await self.run.follow(await workplace.open_run(argument))
             case ScreenAction.UNFOLD:

@@ -1,8 +1,9 @@
 """Settled readings: readings are taken until a whole window of them agrees."""
 
 from collections import deque
-from collections.abc import Awaitable
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -76,14 +77,16 @@ async def read_all(devices: Devices, clock: CellClock) -> DeviceSnapshot:
     """Read everything once: the gauges and a round of the encoders at the same time."""
     answered_s: list[float] = []
 
-    async def timed(reading: Awaitable[Result]) -> Result:
-        value = await reading
+    async def timed(read: Callable[[], Awaitable[Result]]) -> Result:
+        value = await read()
         answered_s.append(clock.now())
         return value
 
-    readings = [timed(devices.read_gauge(one.gauge)) for one in devices.gauges]
-    calls: list[Awaitable[Any]] = [gather_errors("gauges cannot be read", readings)]
-    calls.append(timed(devices.read_encoders()))
+    async def read_gauges() -> list[GaugeReading]:
+        calls = [timed(partial(devices.read_gauge, one.gauge)) for one in devices.gauges]
+        return await gather_errors("gauges cannot be read", calls)
+
+    calls: list[Awaitable[Any]] = [read_gauges(), timed(devices.read_encoders)]
     gauges, encoders = await gather_errors("devices cannot be read", calls)
     last_s = max(answered_s)
     return DeviceSnapshot(last_s, tuple(gauges), encoders, last_s - min(answered_s))

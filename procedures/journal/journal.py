@@ -213,12 +213,8 @@ class Journal(AbstractContextManager["Journal"]):
             place += len(part)
         return digest
 
-    def close(self) -> None:
-        """Close the file, which releases its lock."""
-        os.close(self._descriptor)
-
     def __exit__(self, *_error: object) -> None:
-        self.close()
+        os.close(self._descriptor)  # which releases its lock
 
     def _line(self, event: Event) -> bytes:
         try:

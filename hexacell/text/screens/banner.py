@@ -53,7 +53,9 @@ def run_banner(picture: RunPicture, settings: CellSettings | None) -> Banner:
     rest = ". ".join(filter(None, (remaining(picture, settings), _watching(picture))))
     if picture.question is not None:
         return _asked(picture, rest)
-    word, action, urgency = _word(picture), f"Nothing to do: {_doing(picture)}", Urgency.CALM
+    is_computing = picture.step is not None and picture.step.moves_nothing
+    word = "COMPUTING" if is_computing else "ROBOT MOVES" if isinstance(picture.step, Move) else "MEASURING"
+    action, urgency = f"Nothing to do: {_doing(picture)}", Urgency.CALM
     if picture.status is Status.PAUSED:
         word, action, urgency = "PAUSED", "Press p to go on; the robot stands still", Urgency.ATTENTION
     elif picture.status is Status.PAUSING:
@@ -98,13 +100,6 @@ def _asked(picture: RunPicture, rest: str) -> Banner:
     action = f"{view.title} Press w" if view.title.endswith("?") else f"{view.title}: press w"
     word = "STOPPED" if picture.status is Status.FAULTED else "YOUR TURN"
     return Banner(word, action, "".join(view.paragraphs[:1]), rest, view.urgency)
-
-
-def _word(picture: RunPicture) -> str:
-    step = picture.step
-    if isinstance(step, Move):
-        return "ROBOT MOVES"
-    return "COMPUTING" if step is not None and step.moves_nothing else "MEASURING"
 
 
 def _doing(picture: RunPicture) -> str:

@@ -318,10 +318,12 @@ def decode(line: bytes, path: Path, due: int) -> Entry | None:
         return None
     stated = _FIRST.match(line) if due == 1 else None
     if stated is not None and (version := int(stated[1])) > VERSION:
-        problem = (
-            f"a newer hexacell wrote this journal: its format has version {version}, known is {VERSION}"
+        raise FileError(
+            f"a newer hexacell wrote this journal: its format has version {version}, known is {VERSION}",
+            subject=path,
+            line=1,
+            action="Use that hexacell, or update this one",
         )
-        raise FileError(problem, subject=path, line=1, action="Use that hexacell, or update this one")
     if (match := _LINE.fullmatch(line[: -_TAIL_LENGTH - 1] + b"}")) is None:
         raise _foreign("it has an unknown form", path, due)
     number, at, monotonic, event = match.groups()

@@ -86,7 +86,11 @@ class HostConnection:
                 if self._goes_on_alone:  # what it still says was on its way
                     continue
                 message = protocol.host_message(line)
-                has_ended = has_ended or _is_ending(message)
+                match message:
+                    case protocol.EventRecorded(event=events.Ended() | events.Interrupted()):
+                        has_ended = True
+                    case protocol.HostFailed(exit_code=int()):
+                        has_ended = True
                 yield message
         self._writer.close()
         if not has_ended and not self._is_left:
@@ -119,12 +123,6 @@ class HostConnection:
             raise FileError(
                 "the run cannot be reached any more", action="Look at it with `hexacell history`"
             ) from error
-
-
-def _is_ending(message: protocol.HostMessage) -> bool:
-    if isinstance(message, protocol.EventRecorded):
-        return isinstance(message.event, events.Ended | events.Interrupted)
-    return isinstance(message, protocol.HostFailed) and message.exit_code is not None
 
 
 async def connect_to_run(path: Path) -> HostConnection | None:

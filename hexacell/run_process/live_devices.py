@@ -3,9 +3,8 @@
 import asyncio
 import math
 from collections import deque
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import AsyncExitStack, aclosing, suppress
-from functools import partial
 from statistics import stdev
 from typing import Any
 
@@ -17,11 +16,18 @@ from hexacell.errors import HexacellError
 from hexacell.run_process.messages import GaugeSnapshot, LiveSnapshot, Shown
 from hexacell.runs.cell_lock import cell_lock
 from hexacell.services.devices.device_setup import device_addresses, devices_of
-from procedures.devices.device_set import SAMPLE_PERIOD_S, Devices, LiveValue, LiveValues, poll_for_screens
+from procedures.devices.device_set import (
+    SAMPLE_PERIOD_S,
+    Devices,
+    LiveValue,
+    LiveValues,
+    keep_reading,
+    poll_for_screens,
+    sources,
+)
 from procedures.engine.command_loop import Status
 from procedures.engine.engine import Engine
 from procedures.run.cancellation import cancel_and_wait
-from procedures.run.questions import Question
 from procedures.run.state import RunState
 from procedures.steps import events
 from procedures.steps.move import Move
@@ -101,24 +107,15 @@ async def watch_devices(cell: Cell) -> AsyncIterator[LiveSnapshot]:
         async with AsyncExitStack() as closing:
             closing.push_async_callback(links.close)
             closing.push_async_callback(devices.close)
-            for keep in _keepers(devices):
-                closing.push_async_callback(cancel_and_wait, asyncio.ensure_future(keep))
+            for source in sources(devices):
+                reading = asyncio.ensure_future(_open_and_read(*source))
+                closing.push_async_callback(cancel_and_wait, reading)
             yield feed.snapshot()
             async for _ in devices.live.changes():
                 yield feed.snapshot()
 
 
-def _keepers(devices: Devices) -> Iterator[Awaitable[None]]:
-    live = devices.live
-    for one in devices.gauges:
-        read = partial(devices.read_gauge_once, one.gauge)
-        yield _keep_reading(live.gauge(one.gauge.name), one.gauge.open, read)
-    yield _keep_reading(live.encoders, devices.encoders.open, devices.read_encoders)
-    yield _keep_reading(live.controller, devices.controller.open, devices.controller_status)
-    yield _keep_reading(live.stop_reason, devices.stop_input.open, devices.stop_reason)
-
-
-async def _keep_reading(
+async def _open_and_read(
     shown: LiveValue[Any], connect: Callable[[], Awaitable[Any]], read: Callable[[], Awaitable[Any]]
 ) -> None:
     """Open a device, as often as it takes, and read it; its live value says what is wrong."""
@@ -129,10 +126,7 @@ async def _keep_reading(
         except HexacellError as error:
             shown.fail(str(error))
         await asyncio.sleep(OPEN_EVERY_S)
-    while True:
-        with suppress(HexacellError):  # the live value says why
-            await read()
-        await asyncio.sleep(READ_EVERY_S)
+    await keep_reading(shown, read, READ_EVERY_S)
 
 
 class RunDeviceWatch:
@@ -142,21 +136,21 @@ class RunDeviceWatch:
         self.live = LiveValues()
         self._gauges = tuple(gauges)
         self._feed = LiveFeed(self.live, gauges)
+        self._engine: Engine | None = None
         self._devices: Devices | None = None
         self._polling: asyncio.Task[None] | None = None
-        self._is_asking = False
-        self._is_paused = False
 
     @property
     def is_waiting(self) -> bool:
         """Whether the run waits for a person: a question is open, or it is paused."""
-        return self._is_asking or self._is_paused
+        engine = self._engine
+        return engine is not None and (engine.broker.open is not None or engine.status is Status.PAUSED)
 
     def follow(self, engine: Engine, devices: Devices) -> None:
         """Follow an engine that has not begun; ``devices`` are those that it uses."""
-        self._devices = devices
-        engine.commands.watchers.append(self._on_status)
-        engine.broker.watchers.append(self._on_question)
+        self._engine, self._devices = engine, devices
+        engine.commands.watchers.append(self._reconsider)
+        engine.broker.watchers.append(self._reconsider)
 
     def note(self, event: events.Event, _: RunState | None = None) -> None:
         """Take an event of the run, as its listener: while the robot moves, noise is unknown."""
@@ -178,18 +172,10 @@ class RunDeviceWatch:
 
     def close(self) -> None:
         """Read nothing any more."""
-        self._is_asking = self._is_paused = False
+        self._engine = None
         self._reconsider()
 
-    def _on_status(self, status: Status) -> None:
-        self._is_paused = status is Status.PAUSED
-        self._reconsider()
-
-    def _on_question(self, question: Question | None) -> None:
-        self._is_asking = question is not None
-        self._reconsider()
-
-    def _reconsider(self) -> None:
+    def _reconsider(self, _: object = None) -> None:
         if self.is_waiting and self._polling is None and self._devices is not None:
             self._polling = asyncio.ensure_future(poll_for_screens(self._devices))
         elif not self.is_waiting and self._polling is not None:

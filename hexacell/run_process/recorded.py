@@ -37,23 +37,18 @@ class RecordedRun:
             raise FileError("the journal is empty", subject=folder.journal, action="Choose another run")
         self._started = self._entries[0].event
         self._clock = clock or CellClock()
-        self._sequence, self._speed = 0, 0.0
+        self.last, self.sequence, self._speed = len(self._entries), 0, 0.0
         self._moved = asyncio.Event()
         self._is_left = False
         self.jump(self.last)
 
-    @property
-    def last(self) -> int:
-        """How many lines its journal has."""
-        return len(self._entries)
-
     def step(self, count: int = 1) -> None:
         """Advance by a number of events, or go back if it is negative; stops at both ends."""
-        self.jump(self._sequence + count)
+        self.jump(self.sequence + count)
 
     def jump(self, sequence: int) -> None:
         """Go to a line of the journal; stops at both ends."""
-        self._sequence = min(max(sequence, 1), self.last)
+        self.sequence = min(max(sequence, 1), self.last)
         self._moved.set()
 
     def set_speed(self, speed: float) -> None:
@@ -66,7 +61,7 @@ class RecordedRun:
         sent = 0
         while not self._is_left:
             self._moved.clear()
-            if sent == 0 or sent > self._sequence:
+            if sent == 0 or sent > self.sequence:
                 sent = 0
                 yield protocol.RunDescribed(
                     cell=self._started.cell,
@@ -76,7 +71,7 @@ class RecordedRun:
                     expected_records=fold(entry.event for entry in self._entries).completed,
                     is_recorded=True,
                 )
-            while sent < self._sequence and not self._is_left:
+            while sent < self.sequence and not self._is_left:
                 sent += 1
                 entry = self._entries[sent - 1]
                 yield protocol.EventRecorded(sequence=sent, at=entry.at, event=entry.event)
@@ -128,5 +123,5 @@ class RecordedRun:
             if elapsed < 0.0:  # the machine was restarted
                 elapsed = (following.at - here.at).total_seconds()
             await self._clock.sleep(min(max(elapsed, 0.0), LONGEST_WAIT_S) / self._speed)
-            if self._sequence == sent:
+            if self.sequence == sent:
                 self.jump(sent + 1)

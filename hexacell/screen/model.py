@@ -19,8 +19,7 @@ from hexacell.screen.workplace import Workplace
 from hexacell.services.history.run_index import PastRun
 from hexacell.services.robot_view import first_scene
 from hexacell.text.screens import banner, reviewing
-from hexacell.text.screens.cell_facts import cell_facts
-from hexacell.text.screens.devices import device_cards
+from hexacell.text.screens.devices import cell_facts, device_cards
 from hexacell.text.screens.measuring import (
     accuracy_plot,
     fault_view,
@@ -281,13 +280,13 @@ class ScreenModel:
             case ScreenAction.EXCLUDE:
                 await self._readiness.toggle_exclusion(argument)
             case ScreenAction.COMPARE:
-                await self._history.compare(argument)
+                await self._history.ask(workplace.compare(argument))
             case ScreenAction.DRIFT:
-                await self._history.drift()
+                await self._history.ask(workplace.drift())
             case ScreenAction.ROLL_BACK:
-                return await self._history.roll_back(argument)
+                return await self._history.change_config(workplace.roll_back, argument)
             case ScreenAction.APPLY:
-                return await self._history.apply(argument)
+                return await self._history.change_config(workplace.apply, argument)
             case ScreenAction.OPEN:
                 await self.run.follow(await workplace.open_run(argument))
             case ScreenAction.UNFOLD:

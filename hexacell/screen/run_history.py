@@ -36,26 +36,17 @@ class RunHistory:
         except HexacellError as error:
             self.runs, self._said = (), tuple(str(error).splitlines())
 
-    async def compare(self, run: str) -> None:
-        """Compare a run with the one before it; raises ``HexacellError``."""
-        self._said = await self._workplace.compare(run)
+    async def ask(self, answer: Awaitable[tuple[str, ...]]) -> None:
+        """Show the answer to what is asked about the runs; raises ``HexacellError``."""
+        self._said = await answer
 
-    async def drift(self) -> None:
-        """Show the drift of the parameters; raises ``HexacellError``."""
-        self._said = await self._workplace.drift()
-
-    async def roll_back(self, run: str) -> str:
-        """Restore the config of a run, or undo it; the most important line of what was done."""
-        return await self._change_config(self._workplace.roll_back, run)
-
-    async def apply(self, run: str) -> str:
-        """Write the proposal of a run; the most important line of what was done."""
-        return await self._change_config(self._workplace.apply, run)
-
-    async def _change_config(
+    async def change_config(
         self, change: Callable[[str, str], Awaitable[tuple[str, ...]]], run: str
     ) -> str:
-        """Where somebody has edited the config since, the three versions are shown."""
+        """Write the proposal of a run, or restore its config; the most important line of what was done.
+
+        Where somebody has edited the config since, the three versions are shown.
+        """
         try:
             async with self._devices.released():
                 done = await change(run, PERSON)

@@ -26,13 +26,11 @@ if TYPE_CHECKING:
     from hexacell.screen.model import ScreenModel
     from hexacell.text.screens.measuring import Progress
 
-URGENCY_CLASS = "urgency-{}"
-
 
 def set_urgency(widget: Widget, urgency: Urgency) -> None:
     """Give a widget the class of an urgency, and take those of the others."""
     for one in Urgency:
-        widget.set_class(one is urgency, URGENCY_CLASS.format(one))
+        widget.set_class(one is urgency, f"urgency-{one}")
 
 
 class TextPanel(Static):

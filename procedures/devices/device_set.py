@@ -3,7 +3,7 @@
 import asyncio
 import logging
 import time
-from collections.abc import AsyncGenerator, Awaitable, Callable, Sequence
+from collections.abc import AsyncGenerator, Awaitable, Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -132,17 +132,9 @@ class Devices:
         several = (one if isinstance(one, tuple) else (one,) for one in found)
         return tuple(identity for some in several for identity in some if identity is not None)
 
-    async def read_gauges(
-        self, on_answer: Callable[[], object] = lambda: None
-    ) -> list[interfaces.GaugeReading]:
-        """One reading of each gauge, in the order of ``gauges``; ``on_answer`` is called at each."""
-
-        async def read(gauge: interfaces.Gauge) -> interfaces.GaugeReading:
-            reading = await self.live.gauge(gauge.name).of(gauge.read)
-            on_answer()
-            return reading
-
-        return await gather_errors("gauges cannot be read", [read(one.gauge) for one in self.gauges])
+    async def read_gauge(self, gauge: interfaces.Gauge) -> interfaces.GaugeReading:
+        """One reading of a gauge, which its driver repeats until it is sure."""
+        return await self.live.gauge(gauge.name).of(gauge.read)
 
     async def read_gauge_once(self, gauge: interfaces.Gauge) -> interfaces.GaugeReading:
         """One reading of a gauge, without repetition."""
@@ -229,26 +221,30 @@ def _words(error: Exception) -> str:
     return str(error) if isinstance(error, HexacellError) else repr(error)
 
 
-async def poll_for_screens(devices: Devices, period_s: float = SAMPLE_PERIOD_S) -> None:
-    """Read each device whenever its live value has become older than ``period_s``, until cancelled.
+Source = tuple[LiveValue[Any], Callable[[], Awaitable[Any]], Callable[[], Awaitable[Any]]]
+"""The live value of a device, what opens it, and what reads it once."""
 
-    Only reads that move nothing and change no setting. A device that fails is asked again.
-    """
+
+def sources(devices: Devices) -> Iterator[Source]:
+    """Every device, the gauges first. The reads move nothing and change no setting."""
     live = devices.live
-    gauges = [
-        _poll(live.gauge(one.gauge.name), partial(devices.read_gauge_once, one.gauge), period_s)
-        for one in devices.gauges
-    ]
+    for one in devices.gauges:
+        yield live.gauge(one.gauge.name), one.gauge.open, partial(devices.read_gauge_once, one.gauge)
+    yield live.encoders, devices.encoders.open, devices.read_encoders
+    yield live.controller, devices.controller.open, devices.controller_status
+    yield live.stop_reason, devices.stop_input.open, devices.stop_reason
+
+
+async def poll_for_screens(devices: Devices, period_s: float = SAMPLE_PERIOD_S) -> None:
+    """Read each device whenever its live value has become older than ``period_s``, until cancelled."""
     others_s = max(period_s, OTHERS_PERIOD_S)
-    await asyncio.gather(
-        *gauges,
-        _poll(live.encoders, devices.read_encoders, others_s),
-        _poll(live.controller, devices.controller_status, others_s),
-        _poll(live.stop_reason, devices.stop_reason, others_s),
-    )
+    periods = [period_s] * len(devices.gauges) + [others_s] * 3
+    every = zip(sources(devices), periods, strict=True)
+    await asyncio.gather(*(keep_reading(shown, read, each_s) for (shown, _, read), each_s in every))
 
 
-async def _poll(shown: LiveValue[Any], read: Callable[[], Awaitable[Any]], period_s: float) -> None:
+async def keep_reading(shown: LiveValue[Any], read: Callable[[], Awaitable[Any]], period_s: float) -> None:
+    """Read a device whenever its value has become older, until cancelled; one that fails is asked again."""
     while True:
         if shown.age_s >= period_s:
             with suppress(HexacellError):  # the live value says why

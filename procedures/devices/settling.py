@@ -1,9 +1,10 @@
 """Settled readings: readings are taken until a whole window of them agrees."""
 
 from collections import deque
-from collections.abc import Awaitable
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,6 +15,8 @@ from hexacell.clock import CellClock
 from hexacell.errors import DeviceError, HexacellError, consists_only_of, flatten_errors
 from hexacell.kinematics.rotations import Array
 from procedures.devices.device_set import Devices, gather_errors
+
+Result = TypeVar("Result")
 
 LEAST_WINDOWS = 3
 """So many windows' worth of readings are taken before giving up, however long they take."""
@@ -74,15 +77,16 @@ async def read_all(devices: Devices, clock: CellClock) -> DeviceSnapshot:
     """Read everything once: the gauges and a round of the encoders at the same time."""
     answered_s: list[float] = []
 
-    def note_answer() -> None:
+    async def timed(read: Callable[[], Awaitable[Result]]) -> Result:
+        value = await read()
         answered_s.append(clock.now())
+        return value
 
-    async def read_encoders() -> EncoderSample:
-        sample = await devices.read_encoders()
-        note_answer()
-        return sample
+    async def read_gauges() -> list[GaugeReading]:
+        calls = [timed(partial(devices.read_gauge, one.gauge)) for one in devices.gauges]
+        return await gather_errors("gauges cannot be read", calls)
 
-    calls: list[Awaitable[Any]] = [devices.read_gauges(note_answer), read_encoders()]
+    calls: list[Awaitable[Any]] = [read_gauges(), timed(devices.read_encoders)]
     gauges, encoders = await gather_errors("devices cannot be read", calls)
     last_s = max(answered_s)
     return DeviceSnapshot(last_s, tuple(gauges), encoders, last_s - min(answered_s))

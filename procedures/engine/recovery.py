@@ -18,7 +18,7 @@ from procedures.engine.commands import QuestionBroker
 from procedures.journal.journal import is_evidence_lost
 from procedures.run.keys import SetKey
 from procedures.run.questions import ask_recovery
-from procedures.run.state import RunState
+from procedures.run.state import RunState, place_of
 from procedures.run.trips import Guard, GuardTripped, RobotNotStopped, causes_of, may_still_move
 from procedures.steps import events
 from procedures.steps.base import StepOfSet
@@ -84,7 +84,7 @@ def failed(
     """The event of a failure; of several at once, the one with the most severe action decides."""
     failures: list[events.Failed] = []
     for kind in dict.fromkeys(kind_of(one) for one in causes_of(error)):
-        attempt = state.attempts(kind, step) + 1
+        attempt = state.failures.get((kind, place_of(step)), 0) + 1
         action = policy.action(kind, attempt)
         failures.append(
             events.Failed(step=step, failure=kind, attempt=attempt, reason=str(error), action=action)

@@ -42,7 +42,7 @@ STOP_GRACE_S = 0.5
 
 @dataclass(eq=False)
 class Guards:
-    """The guards of one cell.
+    """The guards of one cell; joints may stop as far from their commands as ``following``, in their unit.
 
     An action under guards raises ``GuardTripped`` if one of them trips: before it, during it, or at the
     end of a move.
@@ -58,11 +58,7 @@ class Guards:
         guards, controller = self.settings.guards, self.devices.controller
         self.position = PositionCheck(self.settings, self.devices, self.clock, self.config)
         self.supervisor = MotionSupervisor(controller, self.clock, self.folder, guards.free_disk_mb)
-        self._following = guards.following
-
-    def allow_following(self, limit: float) -> None:
-        """Let joints stop as far from their commands as this, in their unit."""
-        self._following = limit
+        self.following = guards.following
 
     async def prepare(self, order: Supervised[None]) -> None:
         """Run the order that makes the controller ready to move; releases the latch."""
@@ -73,9 +69,12 @@ class Guards:
         self, moves: Sequence[tuple[Pose, float]], watched: WatchedSet, commanded: Callable[[], Array]
     ) -> None:
         """Move to poses, in s each; ``commanded`` gives the joint variables (6,) at the last of them."""
-        gauges = self._watched_gauges(watched)
-        pollers = self._pollers(controller=True, gauges=gauges)
-        limits = self._limits(zero_mm=watched.zero_mm)
+        zero_mm = watched.zero_mm
+        gauges: tuple[WatchedGauge, ...] = ()
+        if zero_mm is not None:
+            mounted = self.devices.gauges
+            gauges = tuple(WatchedGauge(self.devices, one, zero_mm[one.axis.index]) for one in mounted)
+        pollers, limits = self._pollers(controller=True, gauges=gauges), self._limits(zero_mm=zero_mm)
 
         async def go() -> EncoderSample:
             for target, duration_s in moves:
@@ -97,7 +96,7 @@ class Guards:
 
     async def locate(self) -> PositionReports:
         """Where the robot is, which controller and encoders agree on; nothing moves."""
-        found = await self.position.read(following=self._following)
+        found = await self.position.read(following=self.following)
         if found.reports is None or found.trip is not None:
             assert found.trip is not None  # noqa: S101 - without reports there is a reason
             raise await self.supervisor.stop(found.trip)
@@ -124,8 +123,8 @@ class Guards:
     async def _arrival_trip(self, commanded: Array, reached: EncoderSample) -> Trip | None:
         """A joint is not where it was commanded (6,), or the controller is wrong about where it is."""
         words = self.settings.mechanism.words
-        following = following_error(commanded, np.array(reached.positions), self._following, words)
-        found = await self.position.read(reached, following=self._following)
+        following = following_error(commanded, np.array(reached.positions), self.following, words)
+        found = await self.position.read(reached, following=self.following)
         return following if following and found.odd is PositionSource.ENCODERS else found.trip or following
 
     def _limits(self, rest: float | None = None, zero_mm: ThreeNumbers | None = None) -> GuardLimits:
@@ -149,15 +148,6 @@ class Guards:
             encoders=polling.DevicePoller("encoders", devices.read_encoders) if encoders else None,
             controller=polling.DevicePoller("controller", watched.status) if controller else None,
             stop_input=polling.DevicePoller(STOP_LINE, devices.stop_reason),
-        )
-
-    def _watched_gauges(self, watched: WatchedSet) -> "tuple[WatchedGauge, ...]":
-        zero_mm = watched.zero_mm
-        if zero_mm is None or not watched.is_watched:
-            return ()
-        return tuple(
-            WatchedGauge(self.devices, mounted, zero_mm[mounted.axis.index])
-            for mounted in self.devices.gauges
         )
 
 

@@ -82,6 +82,7 @@ class DevicePoller(Generic[T_co]):
         self.answer_count += 1
 
 
+@dataclass(eq=False)
 class WatchedController:
     """The controller during one action: its status, and since when its heartbeat has stood.
 
@@ -90,18 +91,19 @@ class WatchedController:
     heartbeat stands. For ``patience_s``, s of real time, that may lag behind the joints.
     """
 
-    def __init__(self, devices: Devices, clock: CellClock, moved: float, patience_s: float) -> None:
-        self._devices = devices
-        self._clock = clock
-        self._moved = moved
-        self._patience_s = patience_s
-        self._heartbeat = ""
+    devices: Devices
+    clock: CellClock
+    moved: float
+    patience_s: float
+    _heartbeat: str = ""
+
+    def __post_init__(self) -> None:
         self._restart()
 
     async def status(self) -> ControllerStatus:
         """Its status now; raises ``ControllerFrozen``: its heartbeat stands although a joint moves."""
-        sample = self._devices.live.encoders.value  # before the heartbeat, which may only be newer
-        status = await self._devices.controller_status()
+        sample = self.devices.live.encoders.value  # before the heartbeat, which may only be newer
+        status = await self.devices.controller_status()
         if not status.heartbeat or status.heartbeat != self._heartbeat:
             self._heartbeat = status.heartbeat
             self._restart()
@@ -122,11 +124,11 @@ class WatchedController:
             self._before = sample if self._new_samples > _FRESH_SAMPLES else None
             return
         moved = np.abs(np.subtract(sample.positions, self._before.positions))
-        if moved.max() <= self._moved:
+        if moved.max() <= self.moved:
             return
-        now = self._clock.now()
+        now = self.clock.now()
         self._moving_since_s = now if self._moving_since_s is None else self._moving_since_s
-        if self._clock.real_seconds(now - self._moving_since_s) > self._patience_s:
+        if self.clock.real_seconds(now - self._moving_since_s) > self.patience_s:
             raise ControllerFrozen(
                 f"is frozen: its server answers, but reports one position although encoder "
                 f"{int(moved.argmax()) + 1} shows a move by {moved.max():.1f} {sample.unit}",

@@ -38,15 +38,15 @@ MAX_DELAY_S = 0.02
 """Longest scheduling delay of this process that counts as silence of a device, s of real time."""
 
 
+@dataclass(eq=False)
 class MotionSupervisor:
     """Supervises actions. A trip is latched: no further action starts until ``clear`` is called."""
 
-    def __init__(self, controller: Controller, clock: CellClock, folder: Path, free_disk_mb: float) -> None:
-        self.latched: Trip | None = None
-        self._controller = controller
-        self._clock = clock
-        self._folder = folder
-        self._free_disk_mb = free_disk_mb
+    controller: Controller
+    clock: CellClock
+    folder: Path
+    free_disk_mb: float
+    latched: Trip | None = None
 
     def clear(self) -> None:
         """Release the latch; the next action evaluates all guards again before it starts."""
@@ -56,7 +56,7 @@ class MotionSupervisor:
         """Raise ``GuardTripped`` while a trip is latched or the disk is nearly full."""
         if self.latched is not None:
             raise self.latched.as_error()
-        if trip := low_disk_space(self._folder, self._free_disk_mb):
+        if trip := low_disk_space(self.folder, self.free_disk_mb):
             raise self.latch(trip)
 
     def latch(self, trip: Trip) -> GuardTripped:
@@ -67,7 +67,7 @@ class MotionSupervisor:
     async def stop(self, trip: Trip) -> GuardTripped:
         """Stop the robot, even if cancelled meanwhile, and latch; returns the error to raise."""
         try:
-            await shielded(self._controller.stop())
+            await shielded(self.controller.stop())
         except HexacellError as error:
             trip = replace(trip, stop_failure=str(error))
         return self.latch(trip)
@@ -89,7 +89,7 @@ class MotionSupervisor:
             HexacellError: the action failed, and no guard explains it.
         """
         self.check()
-        async with GuardMonitor(devices, limits, self._clock) as monitor:
+        async with GuardMonitor(devices, limits, self.clock) as monitor:
             if trip := await monitor.poll_all():
                 raise self.latch(trip)
             task = asyncio.ensure_future(action())

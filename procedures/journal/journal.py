@@ -213,12 +213,8 @@ class Journal(AbstractContextManager["Journal"]):
             place += len(part)
         return digest
 
-    def close(self) -> None:
-        """Close the file, which releases its lock."""
-        os.close(self._descriptor)
-
     def __exit__(self, *_error: object) -> None:
-        self.close()
+        os.close(self._descriptor)  # which releases its lock
 
     def _line(self, event: Event) -> bytes:
         try:
@@ -320,15 +316,21 @@ def decode(line: bytes, path: Path, due: int) -> Entry | None:
     """
     if not line.endswith(b"\n") or not is_whole(line[:-1]):
         return None
-    if due == 1:
-        _require_known_version(line, path)
+    stated = _FIRST.match(line) if due == 1 else None
+    if stated is not None and (version := int(stated[1])) > VERSION:
+        raise FileError(
+            f"a newer hexacell wrote this journal: its format has version {version}, known is {VERSION}",
+            subject=path,
+            line=1,
+            action="Use that hexacell, or update this one",
+        )
     if (match := _LINE.fullmatch(line[: -_TAIL_LENGTH - 1] + b"}")) is None:
         raise _foreign("it has an unknown form", path, due)
     number, at, monotonic, event = match.groups()
     if int(number) != due:
         problem = f"the journal is damaged: record {int(number)} is in the place of record {due}"
         raise FileError(problem, subject=path, line=due, action=RESTORE)
-    if due == 1 and not _FIRST.match(line):
+    if due == 1 and stated is None:
         raise _foreign("it states no version", path, due)
     try:
         found = _EVENTS.validate_json(event)
@@ -356,17 +358,6 @@ def begins_whole(line: bytes) -> bool:
 
 def _checksum(body: bytes) -> int:
     return zlib.crc32(b"}", zlib.crc32(body))
-
-
-def _require_known_version(line: bytes, path: Path) -> None:
-    stated = _FIRST.match(line)
-    if stated is not None and (version := int(stated[1])) > VERSION:
-        raise FileError(
-            f"a newer hexacell wrote this journal: its format has version {version}, known is {VERSION}",
-            subject=path,
-            line=1,
-            action="Use that hexacell, or update this one",
-        )
 
 
 def _foreign(reason: str, path: Path, due: int) -> FileError:

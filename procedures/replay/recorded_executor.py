@@ -35,17 +35,20 @@ Result = TypeVar("Result")
 
 @dataclass(slots=True)
 class Recorded:
-    """The recorded outcome of the step that is repeated."""
+    """The recorded outcome of the step that is repeated, and the operator who gives its answers."""
 
     outcome: events.Event | None = None
 
-    @property
-    def reading(self) -> Reading:
-        """Its reading; raises ``DeviceError`` if it has none."""
-        reading: Reading | None = getattr(self.outcome, "reading", None)
-        if reading is None:
-            raise DeviceError("the journal has no reading for this step", subject="the recorded devices")
-        return reading
+    async def ask(self, question: Question) -> str | None:
+        """Who approved a change or kept it, if a person did; a failure is never asked about here."""
+        match self.outcome:
+            case events.Committed(approved_by=name):
+                return name
+            case events.ResultAccepted(asked=False):
+                raise AnswerNeeded("nobody was asked")
+            case events.ResultAccepted(by=name):
+                return name
+        return question.default
 
 
 class _Absent:
@@ -57,24 +60,6 @@ class _Absent:
 
 async def _nothing(*_args: object, **_named: object) -> Any:  # noqa: ANN401 - of whatever is asked
     """Nothing to do."""
-
-
-@dataclass(frozen=True, slots=True)
-class RecordedOperator:
-    """An operator who gives the recorded answers."""
-
-    recorded: Recorded
-
-    async def ask(self, question: Question) -> str | None:
-        """Who approved a change or kept it, if a person did; a failure is never asked about here."""
-        outcome = self.recorded.outcome
-        if isinstance(outcome, events.Committed):
-            return outcome.approved_by
-        if isinstance(outcome, events.ResultAccepted):
-            if not outcome.asked:
-                raise AnswerNeeded("nobody was asked")
-            return outcome.by
-        return question.default
 
 
 class InactiveGuards(Guards):
@@ -98,8 +83,7 @@ class RecordedStepExecutor(StepExecutor):
         """For a cell and a temporary folder."""
         recorded, absent = Recorded(), cast("Any", _Absent())
         devices = Devices((), absent, absent)
-        operator = RecordedOperator(recorded)
-        return cls(cell, calibration, devices, CellClock(), operator, folder, recorded=recorded)
+        return cls(cell, calibration, devices, CellClock(), recorded, folder, recorded=recorded)
 
     @cached_property
     def guards(self) -> Guards:
@@ -130,7 +114,10 @@ class RecordedStepExecutor(StepExecutor):
         outcome = self.recorded.outcome
         if isinstance(outcome, events.RecordRejected) and outcome.reading is None:
             raise GaugeAtEnd(outcome.reason)
-        reading, timing = self.recorded.reading, self.cell.settings.timing
+        reading: Reading | None = getattr(outcome, "reading", None)
+        if reading is None:
+            raise DeviceError("the journal has no reading for this step", subject="the recorded devices")
+        timing = self.cell.settings.timing
         too_wide = max(reading.spread_mm) > timing.spread_gauge_mm + TOLERANCE
         if too_wide or len(reading.counts) < windows * timing.readings:
             raise DeviceError("the recorded readings had not settled", subject="the recorded devices")

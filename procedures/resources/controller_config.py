@@ -90,7 +90,11 @@ class Startup:
             try:
                 await self._prepare((self.stated | granted) - theirs)
             except StartupNotPermitted as refusal:
-                granted |= await self._permitted(refusal, is_theirs=refusal.needed in theirs)
+                is_theirs = refusal.needed in theirs
+                question = ask_startup(refusal.needed, str(refusal), is_theirs=is_theirs)
+                if await self.operator.ask(question) != YES:
+                    raise Interruption(f"{refusal}, which was left as it is") from None
+                granted |= frozenset() if is_theirs else {refusal.needed}
             else:
                 return
 
@@ -105,12 +109,6 @@ class Startup:
 
         await self.guards.prepare(order)
 
-    async def _permitted(self, refusal: StartupNotPermitted, *, is_theirs: bool) -> StartupActions:
-        """What a person permits; nothing where that person has done it."""
-        if await self.operator.ask(ask_startup(refusal.needed, str(refusal), is_theirs=is_theirs)) != YES:
-            raise Interruption(f"{refusal}, which was left as it is")
-        return frozenset() if is_theirs else frozenset({refusal.needed})
-
 
 _log = logging.getLogger(__name__)
 
@@ -121,9 +119,9 @@ _NAMES = {WriteKind.RESULT: "the new geometry", WriteKind.PROVISIONAL: "the prov
 _UNDOES = {WriteKind.RESULT: WriteKind.TAKEN_BACK, WriteKind.PROVISIONAL: WriteKind.PROVISIONAL_TAKEN_BACK}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class ConfigChanges:
-    """Changes the config of one run, and makes the controller read it.
+    """Changes the config of one run, makes the controller read it, and notices where somebody edited it.
 
     ``require_evidence`` raises ``EvidenceLost`` if there is no journal on which a change could rest.
     """
@@ -132,6 +130,7 @@ class ConfigChanges:
     startup: Startup
     folder: RunFolder
     require_evidence: Callable[[], None]
+    _unedited: Contents | None = field(default=None, init=False)
 
     @property
     def provisional_backup(self) -> Path:
@@ -195,6 +194,26 @@ class ConfigChanges:
         if state.started and fingerprint(*self.cell.config_paths) != state.started.config_sha256:
             raise _edited(self.cell.config_path)
 
+    def require_unedited(self, state: RunState) -> None:
+        """Make sure that the config is as the run has it; while it is being changed, it may be either.
+
+        Raises ``FileError``, with the first line that differs if this process has seen it before.
+        """
+        if not (expected := expected_fingerprints(self.folder, state)):
+            return
+        found = read_contents(self.cell.config_paths)
+        if fingerprint_of(found) not in expected:
+            raise _edited(*self._first_difference(found))
+        self._unedited = found
+
+    def _first_difference(self, found: Contents) -> tuple[Path, int | None]:
+        """The first file that differs, and its first line that does; no line if that is not known."""
+        for path, old, new in zip(self.cell.config_paths, self._unedited or (), found, strict=False):
+            if old != new:
+                lines = zip_longest(old.split(b"\n"), new.split(b"\n"))
+                return path, next((row for row, (one, two) in enumerate(lines, 1) if one != two), None)
+        return self.cell.config_path, None
+
     async def _recorded(self, cause: WriteCause, write: Callable[[], Result]) -> Result:
         """Write, and record it; without a record the run goes on, warned: its journal has the write."""
         layout, paths = ConfigLayout.of(self.cell.settings), self.cell.config_paths
@@ -228,36 +247,6 @@ def require_no_provisional(cell: Cell) -> None:
                 subject=cell.config_path,
                 action="Resume that run, which restores the geometry",
             )
-
-
-@dataclass(eq=False)
-class ConfigEdits:
-    """Notices that somebody edited the config of a run, before the robot moves again."""
-
-    paths: tuple[Path, ...]
-    folder: RunFolder
-    _unedited: Contents | None = field(default=None, init=False)
-
-    def require_none(self, state: RunState) -> None:
-        """Make sure that the config is as the run has it; while it is being changed, it may be either.
-
-        Raises ``FileError``, with the first line that differs if this process has seen it before.
-        """
-        if not (expected := expected_fingerprints(self.folder, state)):
-            return
-        found = read_contents(self.paths)
-        if fingerprint_of(found) in expected:
-            self._unedited = found
-            return
-        raise _edited(*self._first_difference(found))
-
-    def _first_difference(self, found: Contents) -> tuple[Path, int | None]:
-        """The first file that differs, and its first line that does; no line if that is not known."""
-        for path, old, new in zip(self.paths, self._unedited or (), found, strict=False):
-            if old != new:
-                lines = zip_longest(old.split(b"\n"), new.split(b"\n"))
-                return path, next((row for row, (one, two) in enumerate(lines, 1) if one != two), None)
-        return self.paths[0], None
 
 
 def expected_fingerprints(folder: RunFolder, state: RunState) -> set[str]:

@@ -28,7 +28,7 @@ from procedures.devices.device_set import Devices, Thermometers, gather_errors
 from procedures.devices.settling import DeviceSnapshot, read_series, settle, trimmed_mean
 from procedures.guards.guards import Guards
 from procedures.guards.position_check import PositionReports
-from procedures.resources.controller_config import ConfigChanges, ConfigEdits, Startup
+from procedures.resources.controller_config import ConfigChanges, Startup
 from procedures.run.keys import SetKey, SixNumbers
 from procedures.run.questions import Operator
 from procedures.run.readings import Reading, ReadingSeries, on_parts
@@ -85,11 +85,6 @@ class RunResources:
         """What changes the controller's config."""
         return ConfigChanges(self.cell, self.startup, self.folder, self.require_evidence)
 
-    @cached_property
-    def edits(self) -> ConfigEdits:
-        """Whether somebody edited the config."""
-        return ConfigEdits(self.cell.config_paths, self.folder)
-
     async def prepare(self, state: RunState) -> None:
         """Make the controller, whose config nobody edited, ready to move; raises ``HexacellError``."""
         await self.require_unedited_config(state)
@@ -97,7 +92,7 @@ class RunResources:
 
     async def require_unedited_config(self, state: RunState) -> None:
         """Make sure that nobody edited the config; raises ``FileError``."""
-        self.edits.require_none(state)
+        self.config.require_unedited(state)
 
     # Where the robot is, and how it moves.
 

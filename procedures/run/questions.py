@@ -12,7 +12,6 @@ from hexacell.results.result import ExpectedImprovement
 from hexacell.results.term_result import NOTHING_FOUND, FoundTerms
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.verdict.acceptance_gates import AcceptanceGate
-from hexacell.verdict.verification import Verification
 from procedures.run.keys import Phase, SetKey
 
 PLACED = "placed"
@@ -62,13 +61,12 @@ class StepFailure:
 
 @dataclass(frozen=True, slots=True)
 class WrittenResult:
-    """A result in the controller's config that did not pass: the outcome in one line, and all of it.
+    """A result in the controller's config that did not pass: the outcome in one line.
 
     ``displacement`` is how far it moves taught points; None if that is not known.
     """
 
     line: str
-    verification: Verification
     displacement: TaskDisplacement | None = None
 
 
@@ -111,13 +109,6 @@ def ask_approval(change: PendingChange, *, cell: str) -> Question:
     """Ask whether the config of a cell may be written; answered by the name of who approves."""
     is_grave = any(gate.needs_cell_name and not gate.passed for gate in change.gates)
     return Question(change, consent=cell if is_grave else "yes")
-
-
-def ask_acceptance(
-    line: str, verification: Verification, displacement: TaskDisplacement | None = None
-) -> Question:
-    """Ask whether a result that did not pass stays; answered by the name of who keeps it."""
-    return Question(WrittenResult(line, verification, displacement))
 
 
 def ask_recovery(problem: str, choices: Sequence[Action]) -> Question:

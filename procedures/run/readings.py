@@ -7,7 +7,7 @@ import numpy as np
 from hexacell.cell.devices import ThermometerSettings
 from hexacell.cell.fields import Frozen
 from hexacell.kinematics.parameters import LEGS
-from hexacell.measurements.records import Temperatures, temperatures_of
+from hexacell.measurements.records import Deviation, Temperatures, deviation_of, temperatures_of
 from procedures.run.keys import ArrivalDirections, SixNumbers, ThreeNumbers
 
 
@@ -48,6 +48,10 @@ class Reading(RawReadings):
     directions: ArrivalDirections = ()
     part_temperatures: Temperatures = ()
     at_s: float | None = None
+
+    def deviation_from(self, zero: "Reading") -> Deviation:
+        """What the gauges show beside another reading, mm along base x, y, z."""
+        return deviation_of(np.subtract(self.gauges_mm, zero.gauges_mm))
 
 
 class ReadingSeries(RawReadings):

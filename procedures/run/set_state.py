@@ -6,11 +6,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from hexacell.campaign.pilots import FIRST_REPEAT
 from hexacell.identification.problem.random_walk import NO_WALK, GaugeWalk
-from hexacell.measurements.records import Record, deviation_of
+from hexacell.measurements.records import Record
 from procedures.run.keys import SixNumbers
 from procedures.run.readings import Reading
 
@@ -85,7 +83,7 @@ class SetState:
                 first.record,
                 orientation=FIRST_REPEAT + number,
                 joints=reading.joints,
-                deviation=deviation_of(np.subtract(reading.gauges_mm, first.reading.gauges_mm)),
+                deviation=reading.deviation_from(first.reading),
                 directions=reading.directions,
                 temperatures=reading.part_temperatures,
                 time_s=reading.at_s,

@@ -127,10 +127,6 @@ class RunState:
         """Number of records and closed sets, of which a run is made."""
         return sum(len(measured.samples) + measured.closed for measured in self.sets.values())
 
-    def attempts(self, kind: FailureKind, step: events.BaseStep | None) -> int:
-        """How often a step, or another one of its set, failed in this way."""
-        return self.failures.get((kind, place_of(step)), 0)
-
     def set(self, key: SetKey) -> SetState:
         """One set; an empty one where nothing was measured yet."""
         return self.sets.get(key, SetState())

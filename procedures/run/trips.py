@@ -96,11 +96,10 @@ class WatchedSet:
     """What the gauges of a set must show during a move within it.
 
     Attributes:
-        zero_mm: what they showed along base x, y, z when they were zeroed; None before that.
-        is_watched: whether they stay around the ball; otherwise their readings are not used.
+        zero_mm: what they showed along base x, y, z when they were zeroed; None before that, and where they
+            do not stay around the ball: their readings are not used then.
         moved_mm: by how much the ball surely moves along x, y, z; None where nothing is expected.
     """
 
     zero_mm: tuple[float, float, float] | None
-    is_watched: bool
     moved_mm: tuple[float, ...] | None = None

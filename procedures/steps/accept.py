@@ -4,7 +4,7 @@ from typing import ClassVar, Literal
 
 from hexacell.errors import AnswerNeeded
 from procedures.resources.run_resources import RunResources
-from procedures.run.questions import ask_acceptance
+from procedures.run.questions import Question, WrittenResult
 from procedures.run.state import RunState
 from procedures.steps.base import BaseEvent, StepWithoutMotion
 
@@ -34,10 +34,9 @@ class Accept(StepWithoutMotion):
     async def perform(self, run: RunResources, state: RunState) -> ResultAccepted:
         judged = state.judged
         assert judged is not None  # noqa: S101 - decided only after the verdict
-        assert judged.verification is not None  # noqa: S101 - only then it is offered
         moved = state.proposed.displacement if state.proposed else None
         try:
-            name = await run.operator.ask(ask_acceptance(judged.line, judged.verification, moved))
+            name = await run.operator.ask(Question(WrittenResult(judged.line, moved)))
         except AnswerNeeded:
             return ResultAccepted(by=None, asked=False)
         return ResultAccepted(by=name)

@@ -49,11 +49,10 @@ class Commit(StepWithoutMotion):
 
     async def _approval(self, run: RunResources, state: RunState, change: ConfigChange) -> str:
         """Who approves: the cell file where all gates passed, or a person."""
-        conditions = state.proposed.gates if state.proposed else ()
-        automatic = run.settings.acceptance.approval == "automatic"
-        if automatic and all(gate.passed for gate in conditions):
+        gates = state.proposed.gates if state.proposed else ()
+        if run.settings.acceptance.approval == "automatic" and all(gate.passed for gate in gates):
             return "the cell file: within its limits"
-        pending = pending_change(state, change, conditions)
+        pending = pending_change(state, change, gates)
         name = await run.operator.ask(ask_approval(pending, cell=run.settings.name))
         if name is None:
             raise LimitError("the new geometry was declined; nothing was applied")

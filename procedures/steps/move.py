@@ -185,14 +185,14 @@ class Move(StepAtPose):
 
     def _watched(self, state: RunState) -> WatchedSet:
         """What the gauges of the set must show on the way."""
-        zero_mm, samples = state.zero_shown(self.at), state.set(self.at).samples
-        is_watched = zero_mm is not None and bool(samples) and not self.from_elsewhere
+        samples = state.set(self.at).samples
+        zero_mm = state.zero_shown(self.at) if samples and not self.from_elsewhere else None
         moved_mm = None
         if self.expected is not None and state.at_pose == (self.at, len(samples)):
             change = np.subtract(self.expected.deviation_mm, samples[-1].deviation_mm)
             sure = np.abs(change) - STUCK_GAUGE_SIGMAS * np.array(self.expected.sigma_mm)
             moved_mm = tuple(np.copysign(np.maximum(0.0, sure), change).tolist())
-        return WatchedSet(zero_mm, is_watched=is_watched, moved_mm=moved_mm)
+        return WatchedSet(zero_mm, moved_mm)
 
     async def _refused(self, run: RunResources, state: RunState, refusal: PoseRefused) -> PoseExcluded:
         """A refusal of the pose is no failure: the robot is where it was, and others may be possible.

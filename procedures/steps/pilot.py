@@ -2,9 +2,7 @@
 
 from typing import ClassVar, Literal
 
-import numpy as np
-
-from hexacell.measurements.records import Record, deviation_of
+from hexacell.measurements.records import Record
 from procedures.resources.run_resources import RunResources
 from procedures.run.readings import Reading
 from procedures.run.state import RunState
@@ -20,8 +18,7 @@ class PilotTaken(EventAtPose):
 
     def record(self, zero: Reading) -> Record:
         """The record for the choice of poses; ``zero`` is the reading at the set's reference."""
-        deviation = deviation_of(np.subtract(self.reading.gauges_mm, zero.gauges_mm))
-        return record_of(self, self.reading, deviation)
+        return record_of(self, self.reading, self.reading.deviation_from(zero))
 
     def applied_to(self, state: RunState) -> RunState:
         measured = state.set(self.at)

@@ -10,7 +10,7 @@ from hexacell.cell.model import CellSettings
 from hexacell.errors import HexacellError, consists_only_of, joined
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
-from hexacell.measurements.records import Deviation, Record, deviation_of
+from hexacell.measurements.records import Deviation, Record
 from hexacell.robot.stated import gauge_travel_of
 from procedures.resources.run_resources import RunResources
 from procedures.run.keys import ThreeNumbers
@@ -86,7 +86,7 @@ class Sample(StepAtPose):
             orientation=self.orientation,
             pose=self.pose,
             reading=reading,
-            deviation_mm=deviation_of(np.subtract(reading.gauges_mm, zero.gauges_mm)),
+            deviation_mm=reading.deviation_from(zero),
         )
 
 
@@ -112,9 +112,9 @@ async def read_inside(
         allowed_mm = run.calibration.known(state).allowances.mounting_mm(Pose(*step.pose))
         require_room(run.settings, reading.gauges_mm, allowed_mm)
         zero = reading
-    deviation = np.subtract(reading.gauges_mm, zero.gauges_mm)
+    deviation = reading.deviation_from(zero)
     room = gauge_travel_of(run.settings).room(zero.gauges_mm)
-    if not room.holds(deviation):
+    if not room.holds(np.array(deviation)):
         reason = f"the ball is {in_words(deviation)} mm from its reference, farther than {room}"
         return RecordRejected(at=step.at, orientation=step.orientation, reason=reason, reading=reading)
     return reading

@@ -38,7 +38,7 @@ class StepExecutor(RunResources):
         """Carry out one step; raises ``HexacellError``."""
         if not step.moves_nothing:
             await self.require_unedited_config(state)
-            self.guards.allow_following(self.calibration.known(state).allowances.following)
+            self.guards.following = self.calibration.known(state).allowances.following
         return await step.perform(self, state)
 
 

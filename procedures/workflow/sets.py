@@ -60,7 +60,8 @@ class NoSafePath(LimitError):
 class SetSteps:
     """Decides on the steps of the sets of one robot, and plans its moves.
 
-    ``trial_mm`` is the length of a move by which the gauges are tried, 0 for no trial.
+    ``trial_mm`` is the length of a move by which the gauges are tried, 0 for no trial. A set's ``ball``
+    (3,), mm, is where the ball was when its gauges were zeroed; None where that is not known.
     """
 
     robot: Robot
@@ -70,8 +71,7 @@ class SetSteps:
     def due_first(self, state: RunState, key: SetKey, ball: Array | None) -> Step | None:
         """What an open set needs before anything else is measured; None if it needs nothing.
 
-        ``ball`` (3,), mm, is where the ball was when the gauges were zeroed, if that is known. Raises
-        ``LimitError`` if the gauges are to be tried, and no small move is possible.
+        Raises ``LimitError`` if the gauges are to be tried, and no small move is possible.
         """
         if state.set(key).reference_unverified:
             return self.at_or_to_reference(state, key, ball)
@@ -97,10 +97,7 @@ class SetSteps:
         return self.at_reference(state, key) or self.to_reference(state, key, ball)
 
     def to_reference(self, state: RunState, key: SetKey, ball: Array | None) -> Move:
-        """Move to the set's reference by a checked path.
-
-        ``ball`` (3,), mm, is where the ball was when the gauges were zeroed, if that is known.
-        """
+        """Move to the set's reference by a checked path; raises ``NoSafePath``."""
         move = reference_move(state, key)
         if not state.refused.allows(move.pose):
             raise NoSafePath(

@@ -71,7 +71,7 @@ class Watched:
     state: RunState
 
     async def slow_move(self) -> None:
-        watched = WatchedSet(self.state.zero_shown(P1), is_watched=True)
+        watched = WatchedSet(self.state.zero_shown(P1))
         target = Pose(0.0, 0.0, 550.0, 0.0, 0.0, 4.0)
         await self.guards.move(
             [(target, 1.3)], watched, lambda: np.array(self.simulated.physics.encoder_positions())

@@ -20,6 +20,7 @@ from random import Random
 import numpy as np
 
 from hexacell.errors import DeviceError, HexacellError, flatten_errors
+from procedures.devices.device_set import gather_errors
 from procedures.devices.settling import trimmed_mean
 from tests.benchmarks.faulty_cell import Fault, FaultyCell
 from tests.benchmarks.figures import NEVER, at_most
@@ -99,14 +100,16 @@ class Day:
         self._move()
         begins_after = self._random.randrange(READINGS)
         try:
-            values, joints = [], []
+            values, joints, devices = [], [], self._cell.devices
             for number in range(READINGS):
                 self._cell.pass_by(POLL_S)
-                values.append([one.value_mm for one in await self._cell.devices.read_gauges()])
-                joints.append((await self._cell.devices.read_encoders()).positions)
+                gauges = [devices.read_gauge(one.gauge) for one in devices.gauges]
+                shown = await gather_errors("gauges cannot be read", gauges)
+                values.append([one.value_mm for one in shown])
+                joints.append((await devices.read_encoders()).positions)
                 if fault is not None and number == begins_after:
                     fault.switch(True)
-            for mounted in self._cell.devices.gauges:
+            for mounted in devices.gauges:
                 await mounted.gauge.check()
         except HexacellError as error:
             return await self._refused(error)

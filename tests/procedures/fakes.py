@@ -16,7 +16,6 @@ from hexacell.clock import CellClock
 from hexacell.errors import HexacellError
 from hexacell.kinematics.pose import Pose
 from hexacell.verdict.acceptance_gates import AcceptanceGate
-from hexacell.verdict.verification import Verification
 from procedures.devices.device_set import Devices, MountedGauge
 from procedures.run import questions
 
@@ -203,7 +202,7 @@ class Approver:
         self.problems: list[str] = []
         self.decisions: list[Action] = []
         self.startup = list(startup)
-        self.verifications: list[Verification] = []
+        self.results: list[str] = []
 
     async def ask(self, question: questions.Question) -> str | None:
         match question.subject:
@@ -213,8 +212,8 @@ class Approver:
             case questions.PendingChange(gates=gates, diff=diff):
                 self.asked.append((gates, diff))
                 return self.name
-            case questions.WrittenResult(verification=verification):
-                self.verifications.append(verification)
+            case questions.WrittenResult(line=line):
+                self.results.append(line)
                 return self.name
             case questions.StepFailure(problem=problem):
                 self.problems.append(problem)

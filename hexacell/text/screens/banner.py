@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from hexacell.cell.model import CellSettings
 from hexacell.run_process.messages import HostFailed, LiveSnapshot
 from hexacell.text.layout import error_with_u
+from hexacell.text.screens.measuring import remaining
 from hexacell.text.screens.questions import question_view
 from hexacell.text.screens.run_picture import RunPicture
-from hexacell.text.screens.time_left import remaining
 from hexacell.text.screens.views import Banner, ChecklistItem, Mark, Urgency
 from hexacell.text.verdict import teaching_line
 from hexacell.verdict.decision import Verdict
@@ -46,13 +46,16 @@ def run_banner(picture: RunPicture, settings: CellSettings | None) -> Banner:
         word = "RECORDED" if picture.state.verdict is None else picture.state.verdict.upper()
         rest = "space plays, arrows step, + and - change the speed; nothing moves"
         urgency = verdict_urgency(picture.state.verdict)
-        return Banner(word, _capital(_recorded(picture)), _following(picture, settings), rest, urgency)
+        shown = _doing(picture) if picture.state.ended is None else picture.state.ended.line
+        return Banner(word, _capital(shown), _following(picture, settings), rest, urgency)
     if picture.status is Status.ENDED:
         return _ended(picture)
     rest = ". ".join(filter(None, (remaining(picture, settings), _watching(picture))))
     if picture.question is not None:
         return _asked(picture, rest)
-    word, action, urgency = _word(picture), f"Nothing to do: {_doing(picture)}", Urgency.CALM
+    is_computing = picture.step is not None and picture.step.moves_nothing
+    word = "COMPUTING" if is_computing else "ROBOT MOVES" if isinstance(picture.step, Move) else "MEASURING"
+    action, urgency = f"Nothing to do: {_doing(picture)}", Urgency.CALM
     if picture.status is Status.PAUSED:
         word, action, urgency = "PAUSED", "Press p to go on; the robot stands still", Urgency.ATTENTION
     elif picture.status is Status.PAUSING:
@@ -60,10 +63,6 @@ def run_banner(picture: RunPicture, settings: CellSettings | None) -> Banner:
     elif picture.status is Status.FAULTED:
         word, action, urgency = "STOPPED", "Nothing to do: the robot is stopped", Urgency.ALARM
     return Banner(word, action, f"Next: {_following(picture, settings)}", rest, urgency)
-
-
-def _recorded(picture: RunPicture) -> str:
-    return picture.state.ended.line if picture.state.ended is not None else _doing(picture)
 
 
 def _ended(picture: RunPicture) -> Banner:
@@ -101,13 +100,6 @@ def _asked(picture: RunPicture, rest: str) -> Banner:
     action = f"{view.title} Press w" if view.title.endswith("?") else f"{view.title}: press w"
     word = "STOPPED" if picture.status is Status.FAULTED else "YOUR TURN"
     return Banner(word, action, "".join(view.paragraphs[:1]), rest, view.urgency)
-
-
-def _word(picture: RunPicture) -> str:
-    step = picture.step
-    if isinstance(step, Move):
-        return "ROBOT MOVES"
-    return "COMPUTING" if step is not None and step.moves_nothing else "MEASURING"
 
 
 def _doing(picture: RunPicture) -> str:

@@ -1,6 +1,9 @@
-"""The devices as they show now: a card each, a line for each gauge, and how gauges are to be placed."""
+"""A cell and its devices: what its file states, and what they show now: a card each, a line a gauge."""
+
+from collections.abc import Iterator
 
 from drivers.interfaces import ControllerStatus, EncoderSample
+from hexacell.cell.loader import Cell
 from hexacell.run_process.messages import GaugeSnapshot, LiveSnapshot, Shown
 from hexacell.text.screens.views import Card, Line, Urgency
 from procedures.run.keys import ThreeNumbers
@@ -15,6 +18,22 @@ OLD_S = 2.0
 """Silence of a device from which it is shown, s."""
 
 NOT_CONNECTED = "No device is connected."
+
+
+def cell_facts(cell: Cell) -> Iterator[str]:
+    """A line each: what there is, what is measured, and what must be reached."""
+    settings = cell.settings
+    controller, plan, limits = settings.controller, settings.identification, settings.acceptance
+    yield f"robot       {settings.robot.mechanism}"
+    yield f"controller  {controller.protocol}"
+    yield f"its config  {', '.join(one.name for one in cell.config_paths)}"
+    gauges = ", ".join(
+        f"{'+' if one.sign > 0 else '-'}{one.axis} {one.protocol}" for one in settings.gauges
+    )
+    yield f"gauges      {gauges}"
+    yield f"encoders    {settings.encoders.protocol}"
+    yield f"plan        {len(plan.points)} points, {plan.orientations} orientations each"
+    yield f"limit       {limits.position_mm:g} mm and {limits.orientation_deg:g} deg at the task poses"
 
 
 def device_cards(live: LiveSnapshot | None, later_s: float) -> tuple[Card, ...]:
@@ -41,11 +60,8 @@ def device_cards(live: LiveSnapshot | None, later_s: float) -> tuple[Card, ...]:
 def _gauge_card(gauge: GaugeSnapshot, later_s: float) -> Card:
     title = f"gauge {gauge.name}" if gauge.name == gauge.axis else f"gauge {gauge.name} along {gauge.axis}"
     age = age_text(gauge.age_s, later_s)
-    if gauge.problem:
-        why = gauge.problem.removeprefix(f"gauge {gauge.name}: ")
-        return Card(title, "NO READING", Urgency.ALARM, "- - -", (why, f"last answer {age}"))
-    if gauge.shown_mm is None:
-        return Card(title, "waiting", Urgency.ATTENTION, "- - -")
+    if gauge.problem or gauge.shown_mm is None:
+        return _without_value(title, "NO READING", gauge.problem.removeprefix(f"gauge {gauge.name}: "), age)
     place, half = plunger_place(gauge), gauge.travel_mm / 2.0
     stands = "mid travel not known" if place is None else f"{place:+.2f} of ±{half:g} mm travel"
     noise = "noise not known yet" if gauge.noise_mm is None else f"noise {1e3 * gauge.noise_mm:.1f} um"
@@ -53,14 +69,17 @@ def _gauge_card(gauge: GaugeSnapshot, later_s: float) -> Card:
     return Card(title, "ok", Urgency.GOOD, f"{gauge.shown_mm:+.4f} {gauge.unit}", lines)
 
 
+def _without_value(title: str, state: str, problem: str, age: str) -> Card:
+    """A device that has a problem, or has not answered yet."""
+    if not problem:
+        return Card(title, "waiting", Urgency.ATTENTION, "- - -")
+    return Card(title, state, Urgency.ALARM, "- - -", (problem, f"last answer {age}"))
+
+
 def _encoder_card(encoders: Shown[EncoderSample], later_s: float) -> Card:
     age = age_text(encoders.age_s, later_s)
-    if encoders.problem:
-        return Card(
-            "encoders", "NO READING", Urgency.ALARM, "- - -", (encoders.problem, f"last answer {age}")
-        )
-    if (sample := encoders.value) is None:
-        return Card("encoders", "waiting", Urgency.ATTENTION, "- - -")
+    if encoders.problem or (sample := encoders.value) is None:
+        return _without_value("encoders", "NO READING", encoders.problem, age)
     numbered = [f"{number} {position:+9.3f}" for number, position in enumerate(sample.positions, start=1)]
     lines = [f"{left}   {right}" for left, right in zip(numbered[:3], numbered[3:], strict=True)]
     return Card("encoders", "ok", Urgency.GOOD, f"six positions, {sample.unit}", (*lines, f"{age} ago"))
@@ -68,11 +87,8 @@ def _encoder_card(encoders: Shown[EncoderSample], later_s: float) -> Card:
 
 def _controller_card(controller: Shown[ControllerStatus], later_s: float) -> Card:
     age = age_text(controller.age_s, later_s)
-    if controller.problem:
-        lines = (controller.problem, f"last answer {age}")
-        return Card("controller", "NO ANSWER", Urgency.ALARM, "- - -", lines)
-    if (status := controller.value) is None:
-        return Card("controller", "waiting", Urgency.ATTENTION, "- - -")
+    if controller.problem or (status := controller.value) is None:
+        return _without_value("controller", "NO ANSWER", controller.problem, age)
     said = tuple(status.error_messages)
     if status.estop:
         return Card("controller", "EMERGENCY STOP", Urgency.ALARM, "stopped", (*said, f"{age} ago"))

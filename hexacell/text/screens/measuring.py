@@ -1,18 +1,25 @@
-"""A run that is being measured: how far it is, its records, the predicted accuracy, and faults in words."""
+"""A run that is being measured: how far it is, its records, the predicted accuracy, faults in words."""
 
 from dataclasses import dataclass
+from itertools import pairwise
+from statistics import median
 
+from hexacell.campaign.budget import TimeModel
 from hexacell.cell.model import CellSettings
 from hexacell.lengths import from_to
 from hexacell.run_process.messages import HostFailed
+from hexacell.text.layout import duration
 from hexacell.text.screens.questions import RECOVERIES
 from hexacell.text.screens.run_picture import RunPicture, Setback
-from hexacell.text.screens.time_left import readings
 from hexacell.text.screens.views import Column, FaultView, PlotView, Row, Series, Urgency
+from procedures.calibration.calibration import Mode
 from procedures.run.keys import Phase
 from procedures.steps import events
 
 RESUMABLE = "What was measured is kept. Mend it, then press r in 2 Preflight, which resumes the run."
+
+PACE_RECORDS = 8
+"""Number of the latest records whose pace counts."""
 
 SUSPICIOUS_SIGMAS = 4.0
 """From so many standard deviations on a record is marked."""
@@ -68,6 +75,44 @@ def progress(picture: RunPicture, settings: CellSettings | None) -> Progress:
     return Progress(place, done, planned)
 
 
+def remaining(picture: RunPicture, settings: CellSettings | None) -> str:
+    """How long the run still takes, and how many readings that is at most; empty if nothing is known."""
+    done, planned = readings(picture)
+    if planned <= 0:
+        return f"{done} readings so far" if done else ""
+    left = max(0, planned - done)
+    minutes = _minutes(picture, settings, left)
+    about = "" if minutes is None else f"About {duration(minutes)} left: "
+    return f"{about}at most {left} of {planned} readings"
+
+
+def readings(picture: RunPicture) -> tuple[int, int]:
+    """How many readings are taken, closings of sets included, and how many are planned; 0 if not known."""
+    done = sum(len(measured.samples) + measured.closed for measured in picture.state.sets.values())
+    return done, picture.described.expected_records if picture.described else 0
+
+
+def _minutes(picture: RunPicture, settings: CellSettings | None, left: int) -> float | None:
+    """By the median of the latest readings, else by what the cell file states; None without either."""
+    recent = picture.record_times[-PACE_RECORDS - 1 :]
+    gaps = [(later - earlier).total_seconds() / 60.0 for earlier, later in pairwise(recent)]
+    if settings is None:
+        return left * median(gaps) if gaps else None
+    stated = TimeModel.of(settings)
+    a_reading = median(gaps) if gaps else stated.record_seconds / 60.0
+    return left * a_reading + _stations_left(picture, settings) * stated.point_minutes
+
+
+def _stations_left(picture: RunPicture, settings: CellSettings) -> int:
+    """How often somebody still has to place the gauges in a calibration; 0 in other runs."""
+    if picture.described is None or picture.described.mode != Mode.OPTIMISE.value:
+        return 0
+    begun = picture.state.sets
+    points = {phase: len(settings.verification.points) for phase in (Phase.BEFORE, Phase.AFTER)}
+    points[Phase.IDENTIFY] = len(settings.identification.points)
+    return sum(max(0, points[phase] - sum(at.phase is phase for at in begun)) for phase in points)
+
+
 def records_by_name(picture: RunPicture) -> dict[str, events.RecordTaken]:
     """The records by the names that people read, in the order in which they were taken."""
     every = (sample for measured in picture.state.sets.values() for sample in measured.samples)
@@ -79,17 +124,12 @@ def record_rows(picture: RunPicture) -> tuple[Row, ...]:
     rows = []
     for name, sample in records_by_name(picture).items():
         values = tuple(f"{value:+.3f}" for value in sample.deviation_mm)
-        off = off_of(picture, sample)
-        if sample.orientation == 1:
-            shown = ("ref.", "")
-        elif off is None:
-            shown = ("", "")
-        else:
-            shown = (f"{off[0]:+.3f}", f"{off[1]:.1f}")
-        is_far = off is not None and off[1] > SUSPICIOUS_SIGMAS
-        far = f"{shown[1]} !" if is_far else shown[1]
-        urgency = Urgency.ATTENTION if is_far else Urgency.CALM
-        rows.append(Row(name, (name, *values, shown[0], far), urgency))
+        shown, urgency = ("ref." if sample.orientation == 1 else "", ""), Urgency.CALM
+        if (off := off_of(picture, sample)) is not None:
+            is_far = off[1] > SUSPICIOUS_SIGMAS
+            shown = f"{off[0]:+.3f}", f"{off[1]:.1f}{' !' if is_far else ''}"
+            urgency = Urgency.ATTENTION if is_far else Urgency.CALM
+        rows.append(Row(name, (name, *values, *shown), urgency))
     return tuple(rows)
 
 

@@ -24,29 +24,21 @@ RUN_COLUMNS = (
 
 def run_rows(runs: Sequence[PastRun]) -> tuple[Row, ...]:
     """A row for each run, in their order."""
-    rows = []
-    for run in runs:
-        was = run.summary
-        cells = (
-            run.name[:19],
-            MODES.get(was.mode, was.mode or "-"),
-            verdict_word(was.verdict),
-            error_with_u(was.accuracy).replace("+-", "±"),
-            standing(run),
-        )
-        rows.append(Row(run.name, cells, verdict_urgency(was.verdict)))
-    return tuple(rows)
+    return tuple(Row(run.name, _cells(run), verdict_urgency(run.summary.verdict)) for run in runs)
+
+
+def _cells(run: PastRun) -> tuple[str, ...]:
+    was = run.summary
+    what, error = MODES.get(was.mode, was.mode or "-"), error_with_u(was.accuracy).replace("+-", "±")
+    return run.name[:19], what, verdict_word(was.verdict), error, standing(run)
 
 
 def trend_plot(runs: Sequence[PastRun]) -> PlotView:
     """The largest error at the task poses by each run, the earliest first, and the latest limit."""
     judged = [one.summary.position for one in reversed(runs) if one.summary.position is not None]
     found = tuple((float(number), max(one.value, 1e-4)) for number, one in enumerate(judged, start=1))
-    with_u = tuple(
-        (float(number), max(one.value, 1e-4) + one.expanded)
-        for number, one in enumerate(judged, start=1)
-        if one.expanded is not None
-    )
+    pairs = zip(found, judged, strict=True)
+    with_u = tuple((x, y + one.expanded) for (x, y), one in pairs if one.expanded is not None)
     limit = judged[-1].limit if judged else None
     return PlotView(
         title="Error at the task poses, mm",

@@ -59,15 +59,8 @@ def question_view(
                 urgency=Urgency.ALARM,
             )
         case questions.UnreadyController(problem=problem, request=request):
-            return QuestionView(
-                title="The controller is not ready",
-                paragraphs=(f"{problem}.", request),
-                instruction="Press y or n.",
-                choices=(
-                    Choice("y", "yes", questions.YES, is_consent=True),
-                    Choice("n", "no", questions.NO),
-                ),
-            )
+            title, asked = "The controller is not ready", (f"{problem}.", request)
+            return yes_or_no(title, asked, ("yes", questions.YES), ("no", questions.NO))
 
 
 def _placement(place: questions.GaugePlacement, live: LiveSnapshot | None) -> QuestionView:
@@ -108,13 +101,24 @@ def _pose_text(pose: Pose) -> str:
     return f"{millimetres} mm; {degrees} deg"
 
 
-ABORTING = QuestionView(
-    title="End this run?",
-    paragraphs=("The robot stops after its step. What was measured is kept: r in 2 Preflight resumes it.",),
-    instruction="Press y or n.",
-    choices=(Choice("y", "yes, end it", questions.YES, is_consent=True), Choice("n", "no, go on", None)),
-)
+def yes_or_no(
+    title: str,
+    paragraphs: tuple[str, ...],
+    yes: tuple[str, str],
+    no: tuple[str, str | None],
+    more: str = "",
+) -> QuestionView:
+    """A question of consent by one key: the words and the value of each answer."""
+    choices = Choice("y", *yes, is_consent=True), Choice("n", *no)
+    return QuestionView(title, paragraphs, f"Press y or n{more}.", choices)
 
+
+ABORTING = yes_or_no(
+    "End this run?",
+    ("The robot stops after its step. What was measured is kept: r in 2 Preflight resumes it.",),
+    ("yes, end it", questions.YES),
+    ("no, go on", None),
+)
 
 AGAIN_FOLLOWS = (
     "The robot goes back to the reference of its point. Where that shows something else by now, because "
@@ -124,15 +128,9 @@ AGAIN_FOLLOWS = (
 
 def again_question(record: str) -> QuestionView:
     """What a person confirms before a record that was taken is taken once more."""
-    return QuestionView(
-        title=f"Measure record {record} again?",
-        paragraphs=(AGAIN_FOLLOWS,),
-        instruction="Press y or n.",
-        choices=(
-            Choice("y", "yes, measure it again", questions.YES, is_consent=True),
-            Choice("n", "no, keep it", None),
-        ),
-    )
+    title = f"Measure record {record} again?"
+    yes = "yes, measure it again", questions.YES
+    return yes_or_no(title, (AGAIN_FOLLOWS,), yes, ("no, keep it", None))
 
 
 def _gate_line(gate: AcceptanceGate) -> str:
@@ -155,12 +153,12 @@ def _consenting(
     otherwise: str = "leave the config as it is",
 ) -> QuestionView:
     """A question of consent: by one key, or by the cell's name where it is grave."""
-    decline = Choice("n", f"no, {otherwise}", None)
+    decline = f"no, {otherwise}", None
     if question.consent == "yes":
-        consent = Choice("y", f"yes, {what}", person, is_consent=True)
-        return QuestionView(title, (), "Press y or n; page up and page down scroll.", (consent, decline))
+        return yes_or_no(title, (), (f"yes, {what}", person), decline, "; page up and page down scroll")
     instruction = (
         f"Type the cell's name, {question.consent}, and Enter to take the responsibility. "
         "Tab, then n declines; page up and page down scroll."
     )
-    return QuestionView(title, (), instruction, (decline,), typed=question.consent, consent=person)
+    choices = (Choice("n", *decline),)
+    return QuestionView(title, (), instruction, choices, typed=question.consent, consent=person)

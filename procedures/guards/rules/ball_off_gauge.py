@@ -1,4 +1,4 @@
-"""The ball leaves the gauge plate."""
+"""The ball leaves the gauge plate: its deviation exceeds the limit and its first value."""
 
 from procedures.guards.polling import PolledDevices
 from procedures.guards.rules.base import GuardLimits
@@ -6,7 +6,6 @@ from procedures.run.trips import Guard, Trip
 
 
 def ball_off_gauge(devices: PolledDevices, limits: GuardLimits) -> Trip | None:
-    """The ball leaves the gauge plate: its deviation exceeds the limit and its first value."""
     for gauge in devices.gauges:
         if gauge.value is None or gauge.first is None:
             continue

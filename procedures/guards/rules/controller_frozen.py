@@ -7,7 +7,6 @@ from procedures.run.trips import Guard, Trip
 
 
 def controller_frozen(devices: PolledDevices, _limits: GuardLimits) -> Trip | None:
-    """The controller answers, but always the same, although the joints move."""
     report = devices.controller
     if report is None or not isinstance(report.error, ControllerFrozen):
         return None

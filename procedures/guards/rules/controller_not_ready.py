@@ -6,7 +6,6 @@ from procedures.run.trips import Guard, Trip
 
 
 def controller_not_ready(devices: PolledDevices, _limits: GuardLimits) -> Trip | None:
-    """The controller is in emergency stop, off, or reports a following error."""
     report = devices.controller
     if report is None or report.value is None or report.value.may_move:
         return None

@@ -1,4 +1,4 @@
-"""Devices report a fault, or only garbled answers."""
+"""Devices report a fault, or only garbled answers; all of them are named."""
 
 from drivers.errors import GaugeAtEnd
 from procedures.guards.polling import PolledDevices
@@ -7,7 +7,6 @@ from procedures.run.trips import Guard, Trip
 
 
 def device_faults(devices: PolledDevices, _limits: GuardLimits) -> Trip | None:
-    """Devices report a fault, or only garbled answers; all of them are named."""
     trips = [
         fault_trip(Guard.DEVICE, report)
         for report in devices.all()

@@ -6,7 +6,6 @@ from procedures.run.trips import Guard, Trip
 
 
 def device_silent(devices: PolledDevices, limits: GuardLimits) -> Trip | None:
-    """A device is silent for longer than allowed."""
     for report in devices.all():
         if report.line.silent_s > limits.stale_s:
             problem = f"has not answered for {report.line.silent_s:.2g} s while it was needed"

@@ -6,6 +6,5 @@ from procedures.run.trips import Guard, Trip
 
 
 def encoder_fault(devices: PolledDevices, _limits: GuardLimits) -> Trip | None:
-    """An encoder has an alarm or restarted, or a sample is incomplete."""
     report = devices.encoders
     return None if report is None or report.error is None else fault_trip(Guard.ENCODERS, report)

@@ -7,7 +7,6 @@ from procedures.run.trips import Guard, Trip
 
 
 def stop_requested(devices: PolledDevices, _limits: GuardLimits) -> Trip | None:
-    """A stop input forbids motion."""
     line = devices.stop_input
     return None if line is None or not line.value else motion_forbidden(line.value)
 

@@ -8,7 +8,6 @@ from procedures.run.trips import Trip
 
 
 def unexpected_motion(devices: PolledDevices, limits: GuardLimits) -> Trip | None:
-    """A joint moved during standstill."""
     report = devices.encoders
     if limits.rest is None or report is None or report.value is None or report.first is None:
         return None

@@ -20,8 +20,6 @@ from hexacell.text.line_face import run_story, story_text
 from hexacell.text.screens.questions import question_view
 from hexacell.text.verdict import teaching_line, teaching_sentence
 from hexacell.verdict.acceptance_gates import AcceptanceGate
-from hexacell.verdict.decision import Verdict
-from hexacell.verdict.verification import Verification
 from procedures.calibration.calibration import Mode
 from procedures.engine.commands import UnattendedOperator
 from procedures.journal.journal import Entry
@@ -31,7 +29,7 @@ from procedures.run.questions import (
     YES,
     PendingChange,
     Question,
-    ask_acceptance,
+    WrittenResult,
     ask_approval,
     ask_placement,
     ask_recovery,
@@ -112,7 +110,7 @@ GRAVE = ask_approval(
 def test_approval_and_acceptance_say_what_must_be_taught_anew_before_it_asks() -> None:
     moved = TaskDisplacement(position_mm=30.8, orientation_deg=4.0, poses=6, is_within_limits=False)
     whether_written = ask_approval(PendingChange((), "-1\n+2", moved), cell="bench")
-    whether_kept = ask_acceptance("all ill", Verification(verdict=Verdict.FAIL), moved)
+    whether_kept = Question(WrittenResult("all ill", moved))
     for question, asks in ((whether_written, "Write the new"), (whether_kept, "The result did not pass.")):
         *about, asked, request = question_text(question_view(question, None)).splitlines()
         assert teaching_sentence(moved) in " ".join(line.strip() for line in about)

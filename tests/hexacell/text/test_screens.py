@@ -26,11 +26,10 @@ from hexacell.run_process.messages import (
 )
 from hexacell.text.screens.banner import cell_banner, preflight_banner, run_banner
 from hexacell.text.screens.devices import device_cards
-from hexacell.text.screens.measuring import fault_view, record_rows
+from hexacell.text.screens.measuring import fault_view, record_rows, remaining
 from hexacell.text.screens.placing import mounting_advice, placing
 from hexacell.text.screens.reviewing import review_lines
 from hexacell.text.screens.run_picture import RunPicture, Setback, picture_after
-from hexacell.text.screens.time_left import remaining
 from hexacell.text.screens.views import ChecklistItem, Mark, Urgency
 from hexacell.verdict.decision import Verdict
 from procedures.run.keys import Phase, SetKey

@@ -226,7 +226,8 @@ def test_a_journal_that_can_never_be_opened_is_reported(path: Path, monkeypatch,
         patch.setattr(os, name, Mock(side_effect=OSError(errno.EROFS, os.strerror(errno.EROFS))))
         with pytest.raises(FileError, match="the journal cannot be opened: the file system is read-only"):
             Journal(path)
-    Journal(path).close()
+    with Journal(path):
+        pass
 
 
 def test_partial_writes_are_continued_to_a_whole_line(path: Path, monkeypatch) -> None:

@@ -67,8 +67,9 @@ async def test_a_result_that_a_person_keeps_stays_although_the_run_is_killed_bef
     ended = await rig.run()
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
     assert ended.line.endswith(": fail; kept by a tester")
-    (shown,) = rig.operator.verifications
-    assert shown.before_mm > shown.after_mm
+    judged = listening.happened(rig, events.ResultValidated)[0]
+    assert rig.operator.results == [judged.line]
+    assert judged.verification.before_mm > judged.verification.after_mm
     proposed = fold(recording.history).proposed
     assert proposed is not None
     assert ended.displacement == proposed.displacement

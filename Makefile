@@ -65,9 +65,7 @@ docs: venv
 # The pictures of README and docs, and the table of what the last `make bench` measured; CONTRIBUTING.md says which
 # is made by what. The study of designs takes seven minutes on two cores.
 figures: venv
-	HEXACELL_UPDATE_SNAPSHOTS=1 $(RUN) pytest -q tests/screen/test_snapshots.py
-	cp tests/screen/snapshots/measure-140x40-dark.svg docs/screen-measure.svg
-	cp tests/screen/snapshots/review-140x40-light.svg docs/screen-review.svg
+	HEXACELL_UPDATE_SNAPSHOTS=1 $(RUN) pytest -q tests/screen/test_snapshots.py tests/docs/test_howto_pictures.py
 	for cell in simulated-hexaglide gough-stewart linapod rotary-cranks; do \
 		.venv/bin/hexacell view configs/$$cell.toml --output docs/robot-$$cell.svg --no-open; done
 	rm -rf build/study

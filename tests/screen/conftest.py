@@ -105,26 +105,36 @@ async def _until_drawn(pilot: Pilot[int]) -> None:
 
 
 def picture_of(app: TechnicianApp) -> str:
-    """The screen as SVG, without what differs between two equal ones, and without fonts from elsewhere."""
-    svg = app.export_screenshot(simplify=True)
-    svg = re.sub(r"@font-face \{.*?\}\s*", "", svg, flags=re.DOTALL)
-    return re.sub(r"terminal-\d+", "terminal", svg)
+    """The screen as SVG, without what differs between two equal ones."""
+    return re.sub(r"terminal-\d+", "terminal", without_fonts(app.export_screenshot(simplify=True)))
+
+
+def without_fonts(svg: str) -> str:
+    """A terminal as SVG that loads nothing."""
+    return re.sub(r"@font-face \{.*?\}\s*", "", svg, flags=re.DOTALL)
 
 
 async def compare_with_snapshot(name: str, pilot: Pilot[int]) -> None:
     """Compare what is shown with the picture that was kept; keep it where that is asked for."""
-    path, app = SNAPSHOTS / f"{name}.svg", pilot.app
-    assert isinstance(app, TechnicianApp)
+    compare_with_kept(SNAPSHOTS / f"{name}.svg", await settled_picture(pilot))
+
+
+async def settled_picture(pilot: Pilot[int]) -> str:
+    """What is shown once it does not change any more."""
+    assert isinstance(pilot.app, TechnicianApp)
     await settled(pilot)
     before = ""
-    while before != (now := picture_of(app)):  # what was just made is drawn next
+    while before != (now := picture_of(pilot.app)):  # what was just made is drawn next
         before = now
         await settled(pilot)
+    return now
+
+
+def compare_with_kept(path: Path, picture: str) -> None:
+    """Compare a picture with the one that was kept; keep it where that is asked for."""
     if UPDATE in os.environ:
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(picture_of(app))
-        return
-    if picture_of(app) == path.read_text():
-        return
-    (path.parent / f"{name}.now.svg").write_text(picture_of(app))
-    pytest.fail(f"{name} looks different, see {name}.now.svg; {UPDATE}=1 keeps it so")
+        path.write_text(picture)
+    elif picture != path.read_text():
+        now = path.with_suffix(".now.svg")
+        now.write_text(picture)
+        pytest.fail(f"{path.stem} looks different, see {now.name}; {UPDATE}=1 keeps it so")

@@ -14,6 +14,7 @@ from hexacell.cell.loader import Cell, load_cell
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.errors import FileError
 from hexacell.kinematics.pose import Pose
+from hexacell.results.run_comparison import ParameterTrend
 from hexacell.run_process.messages import StatusChanged
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.child import Preflight, TriedPlan
@@ -27,13 +28,21 @@ from procedures.engine.command_loop import Status
 from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import PendingChange, ask_approval, ask_placement, ask_recovery
 from procedures.steps import events
-from tests.screen.conftest import SNAPSHOTS, UPDATE, compare_with_snapshot
+from tests.screen.animation import animated
+from tests.screen.conftest import (
+    SNAPSHOTS,
+    UPDATE,
+    compare_with_kept,
+    compare_with_snapshot,
+    settled_picture,
+)
 from tests.screen.test_found_terms import told
 from tests.screen.test_job import press, until_shown, workplace_of
 from tests.screen.test_plan_screen import tried
 from tests.screen.told_run import ToldRun, ToldWorkplace, past_run, snapshot
 from tests.waiting import until
 
+DOCS = SNAPSHOTS.parents[2] / "docs"
 SIZES = {"80x24": (80, 24), "140x40": (140, 40)}
 COLOURED = {"cell", "review", "history", "approve", "fault"}
 """Pictures that have every colour of a theme between them: at the larger size compared in all themes."""
@@ -65,14 +74,26 @@ def judged(
 
 
 def idle(cell: Cell) -> ToldWorkplace:
+    checks = [
+        judged(f"2026-03-{day:02}T023000Z", "check", Verdict.PASS, mm, 0.080)
+        for day, mm in enumerate((0.041, 0.055, 0.038, 0.062, 0.148, 0.153), start=3)
+    ]
     entries = (
+        judged("2026-03-09T023000Z", "check", Verdict.CONDITIONAL_PASS, 0.231, 0.080),
+        *reversed(checks),
         judged("2026-03-02T080000Z", "optimise", Verdict.PASS, 0.034, 0.090, is_in_controller=True),
-        judged("2026-02-02T073000Z", "check", Verdict.CONDITIONAL_PASS, 0.201, 0.080),
+        judged("2026-02-02T073000Z", "optimise", Verdict.PASS, 0.040, 0.088),
+        judged("2026-01-05T074500Z", "optimise", Verdict.PASS, 0.037, 0.091),
     )
+    trends = [
+        ParameterTrend("B2y", "mm", (-67.395, -67.384, -67.374), (0.009,) * 3, 0.00037, 0.00022),
+        ParameterTrend("l4", "mm", (610.612, 610.668, 610.723), (0.011,) * 3, 0.00198, 0.00028),
+    ]
     return ToldWorkplace(
         cell,
         live=[snapshot(y={"problem": "gauge y: it does not answer. Look at its cable", "age_s": 12.0})],
         entries=entries,
+        trends=trends,
         preflight=Preflight(
             items=(
                 ChecklistItem(Mark.DONE, "points and poses within reach"),
@@ -85,7 +106,6 @@ def idle(cell: Cell) -> ToldWorkplace:
                 "55 records will give about 0.062 mm at the worst of your task poses, in about 24 minutes.",
             )
         ),
-        compared=("Since the run before, B2y changed most: by +0.021 mm (sigma 0.009). Compared:",),
     )
 
 
@@ -101,6 +121,12 @@ Pictures = dict[str, tuple[str, ...]]
 Opening = tuple[ToldWorkplace, Pictures]
 
 
+def changed(cell: Cell, section: str, **values: object) -> Cell:
+    """A cell with other values in a section of its file."""
+    part = getattr(cell.settings, section).model_copy(update=values)
+    return replace(cell, settings=cell.settings.model_copy(update={section: part}))
+
+
 def scene_plan(cell: Cell, _: History) -> Opening:
     workplace, plan = idle(cell), tried(cell)
     pose = plan.poses[1][2].as_tuple()
@@ -111,10 +137,7 @@ def scene_plan(cell: Cell, _: History) -> Opening:
 
 
 def scene_measure(cell: Cell, history: History) -> Opening:
-    _, workplace = running(cell, history, MEASURED)
-    target = cell.settings.identification.model_copy(update={"target_mm": 0.1})
-    settings = cell.settings.model_copy(update={"identification": target})
-    workplace.cell = replace(cell, settings=settings)
+    _, workplace = running(changed(cell, "identification", target_mm=0.1), history, MEASURED)
     return workplace, {"measure": ("3",), "digits": ("d",), "help": ("escape", "question_mark")}
 
 
@@ -171,7 +194,7 @@ def scene_fault(cell: Cell, history: History) -> Opening:
 SCENES: dict[str, Callable[[Cell, History], Opening]] = {
     "idle": lambda cell, _: (
         idle(cell),
-        {"cell": ("1",), "preflight": ("2", "v", "enter"), "history": ("5", "v")},
+        {"cell": ("1",), "preflight": ("2", "v", "enter"), "history": ("5", "o")},
     ),
     "plan": scene_plan,
     "measure": scene_measure,
@@ -214,12 +237,47 @@ async def test_it_looks_as_it_did(scene, size, cell, history, opened) -> None:
                 await compare_with_snapshot(f"{picture}-{size}-{theme}", pilot)
 
 
+RECORDED = {9: "1/1", 59: "1/4", 87: "1/11", 147: "2/11", 207: "3/11", 267: "4/11", 327: "5/11"}
+"""Events after which the animated picture shows the run, and the record that is the latest then."""
+
+
+async def test_the_animated_picture_shows_the_job_on_the_present_screens(cell, history, opened) -> None:
+    run, workplace = running(changed(cell, "acceptance", position_mm=0.25), history, 5)
+    async with opened(workplace, (110, 36)) as pilot:
+        pictures = []
+        run.ask(ask_placement(SetKey(phase=Phase.IDENTIFY, point=1), Pose(0.0, 0.0, 550.0)))
+        for x_mm, z_mm, said in ((-3.2, 1.1, "3.2 mm in"), (0.1, 1.1, "✓ x"), (0.1, 0.0, "✓ z")):
+            run.tell(snapshot(x={"shown_mm": x_mm}, z={"shown_mm": z_mm}))
+            await until_shown(pilot, said)
+            pictures.append(await settled_picture(pilot))
+        run.close_question()
+        await press(pilot, "3")
+        for count, record in RECORDED.items():
+            x, y, z = ({"shown_mm": mm} for mm in history[count - 1].reading.gauges_mm)
+            run.tell(snapshot(x=x, y=y, z=z))
+            run.record(history[run.events : count])
+            await until_shown(pilot, record)
+            pictures.append(await settled_picture(pilot))
+        run.record(history[run.events :])
+        run.tell(StatusChanged(status=Status.ENDED))
+        await press(pilot, "4")
+        await until_shown(pilot, "PASS")
+        pictures.append(await settled_picture(pilot))
+    seconds = [2.0, 1.5, 2.0, *[1.5] * len(RECORDED), 6.0]
+    compare_with_kept(DOCS / "screen-job.svg", animated(pictures, seconds))
+
+
 @pytest.mark.parametrize(
     ("page", "snapshot_name"),
-    [("screen-measure", "measure-140x40-dark"), ("screen-review", "review-140x40-light")],
+    [
+        ("screen-review", "review-140x40-light"),
+        ("screen-place", "place-80x24-dark"),
+        ("screen-plan", "plan-80x24-dark"),
+        ("screen-history", "history-140x40-light"),
+    ],
 )
 def test_the_pictures_in_the_docs_are_those_that_are_kept(page: str, snapshot_name: str) -> None:
-    docs = SNAPSHOTS.parents[2] / "docs" / f"{page}.svg"
+    docs = DOCS / f"{page}.svg"
     kept = (SNAPSHOTS / f"{snapshot_name}.svg").read_text()
     if UPDATE in os.environ:
         docs.write_text(kept)

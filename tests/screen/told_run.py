@@ -9,6 +9,7 @@ from pathlib import Path
 from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.cell.loader import Cell
 from hexacell.dry_run.campaign import VisitedPose
+from hexacell.results.run_comparison import ParameterTrend
 from hexacell.run_process.client import RunConnection
 from hexacell.run_process.messages import (
     ControlChanged,
@@ -25,6 +26,7 @@ from hexacell.runs.run_folder import RunFolder
 from hexacell.screen.child import Preflight, TriedPlan
 from hexacell.screen.workplace import Workplace
 from hexacell.services.history.run_index import PastRun, RunSummary
+from hexacell.text.history import drift_text
 from hexacell.text.screens.views import ChecklistItem, Mark
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Command
@@ -140,7 +142,7 @@ class ToldWorkplace(Workplace):
     )
     plan: TriedPlan = field(default_factory=TriedPlan)
     entries: tuple[PastRun, ...] = ()
-    compared: tuple[str, ...] = ()
+    trends: Sequence[ParameterTrend] = ()
     started: RunConnection | None = None
     opened: RunConnection | None = None
     begun: list[str] = field(default_factory=list)
@@ -177,10 +179,10 @@ class ToldWorkplace(Workplace):
         return self.entries
 
     async def compare(self, run: str) -> tuple[str, ...]:
-        return (*self.compared, run)
+        return (run,)
 
     async def drift(self) -> tuple[str, ...]:
-        return ("No parameter walks.",)
+        return tuple(drift_text(self.trends).splitlines())
 
     async def is_in_controller(self, run: str) -> bool:
         return run == self.entries[0].name

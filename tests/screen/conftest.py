@@ -17,7 +17,7 @@ from hexacell.cell.loader import Cell, load_cell
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.model import ScreenModel
 from hexacell.screen.preferences import ScreenPreferences
-from hexacell.screen.widgets import TextList
+from hexacell.screen.widgets import Table, TextList
 from hexacell.screen.workplace import Workplace
 from procedures.run.cancellation import cancel_and_wait
 from procedures.steps.events import Event
@@ -91,9 +91,10 @@ async def settled(pilot: Pilot[int]) -> None:
     await pilot.pause()
     app.draw()
     await _until_drawn(pilot)
-    # At its anchor a list moves its scroll bar without drawing it.
+    # At its anchor a list moves its scroll bar without drawing it; a table does not move one that is new.
     for screen in app.screen_stack:
-        for one in screen.query(TextList):
+        for one in (*screen.query(TextList), *screen.query(Table)):
+            one.vertical_scrollbar.position = one.scroll_y
             one.vertical_scrollbar.refresh()
     await _until_drawn(pilot)
 

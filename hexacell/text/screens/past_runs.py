@@ -14,10 +14,10 @@ NOTHING_ASKED = (
 )
 
 RUN_COLUMNS = (
-    Column("run", 21),
-    Column("what", 13),
+    Column("run", 20),
+    Column("what", 12),
     Column("verdict", 18),
-    Column("error ± U, mm", 16),
+    Column("error ± U, mm", 15),
     Column("controller", 13),
 )
 

@@ -97,6 +97,11 @@ async def test_a_recorded_run_is_watched_again_with_its_cursor_and_undone(cell, 
         await until_shown(pilot, " 2/")
         await press(pilot, "left", "end")
         await until(lambda: shown(pilot) == last)
+        await press(pilot, "space")  # from the end it is played from the beginning
+        await until_shown(pilot, " x1")
+        assert shown(pilot) != last
+        await press(pilot, "space", "end")
+        await until(lambda: shown(pilot) == last)
         await press(pilot, "5", "b")
         await until_asked(pilot)
         assert "Undo 2026-11-21T100000Z" in shown(pilot)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from hexacell.cell.model import CellSettings
+from hexacell.errors import ExitCode
 from hexacell.run_process.messages import HostFailed, LiveSnapshot
 from hexacell.text.layout import error_with_u
 from hexacell.text.screens.questions import question_view
@@ -19,6 +20,7 @@ from procedures.steps.move import Move
 from procedures.steps.place import Place
 
 NO_RUN = Banner("NO RUN", "Press 2, look at everything, and start one with s", rest="Nothing moves.")
+RESUMING = "Press 2, then r resumes it: nothing is lost"
 STARTING = Banner("STARTING", "Nothing to do: a process of its own connects to the devices")
 AFTER_COMPUTING = {
     "identify": "the held-out poses are measured with the old geometry",
@@ -53,7 +55,9 @@ def run_banner(picture: RunPicture, settings: CellSettings | None) -> Banner:
         return _asked(picture, rest)
     word, action, urgency = _word(picture), f"Nothing to do: {_doing(picture)}", Urgency.CALM
     if picture.status is Status.PAUSED:
-        word, action, urgency = "PAUSED", "Press p to go on; the robot stands still", Urgency.ATTENTION
+        key = "p" if picture.may_command else "c to take over, then p"
+        action = f"Press {key} to go on; the robot stands still"
+        word, urgency = "PAUSED", Urgency.ATTENTION
     elif picture.status is Status.PAUSING:
         word, urgency = "PAUSING", Urgency.ATTENTION
     elif picture.status is Status.FAULTED:
@@ -79,14 +83,15 @@ def _ended(picture: RunPicture) -> Banner:
     if why := picture.why_not_written:
         following = "Press 5: w there writes its proposal after all; 2 and r ask again."
         return Banner("NOT WRITTEN", _capital(why), following, "", Urgency.ATTENTION)
-    reason, is_lost = "its process is gone without a word; the robot may still move", False
+    reason, action = "its process is gone without a word; the robot may still move", RESUMING
     if isinstance(picture.setback, events.Interrupted):
         reason = picture.setback.reason
     elif isinstance(picture.setback, HostFailed):
-        reason, is_lost = picture.setback.problem, picture.setback.evidence_lost
-    action = (
-        "Press 2, then s begins a new run" if is_lost else "Press 2, then r resumes it: nothing is lost"
-    )
+        reason = picture.setback.problem
+        if picture.setback.exit_code == ExitCode.USAGE:  # as it is, it cannot be resumed
+            action = picture.setback.action or RESUMING
+        elif picture.setback.evidence_lost:
+            action = "Press 2, then s begins a new run"
     return Banner("ENDED EARLY", action, _capital(reason), "", Urgency.ALARM)
 
 
@@ -108,7 +113,7 @@ def _word(picture: RunPicture) -> str:
 
 def _doing(picture: RunPicture) -> str:
     if (step := picture.step) is None:
-        return "choosing the next pose"
+        return "choosing the next pose" if picture.state.sets else "devices and controller are made ready"
     if isinstance(step, Move):
         name = step.at.name
         named = {0: f"a waypoint on the way to {name}", 1: f"the reference of {name}"}
@@ -122,7 +127,8 @@ def _following(picture: RunPicture, settings: CellSettings | None) -> str:
     if picture.state.ended is not None:
         return "4 Review shows the result"
     if at is None or (step is not None and step.moves_nothing):
-        return AFTER_COMPUTING.get("" if step is None else step.kind, "the next pose")
+        otherwise = "the next pose" if picture.state.sets else "the robot goes to the first point"
+        return AFTER_COMPUTING.get("" if step is None else step.kind, otherwise)
     if isinstance(step, Place):
         return "the reference is read, then the gauges are tried by small moves"
     return _after_set(picture.state, at, settings)
@@ -147,8 +153,8 @@ def _after_set(state: RunState, at: SetKey, settings: CellSettings | None) -> st
 def _stopping(picture: RunPicture) -> str:
     control = picture.control
     if control is not None and not control.is_in_control:
-        return f"You only watch: {control.who or 'nobody'} is in control; c takes over"
-    return "" if picture.status is Status.PAUSED else "p pauses, P at once, a ends the run"
+        return "You only watch; c takes over"
+    return "a ends it" if picture.status is Status.PAUSED else "p pauses, a ends it"
 
 
 def cell_banner(live: LiveSnapshot | None, problem: str) -> Banner:

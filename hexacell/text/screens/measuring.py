@@ -19,7 +19,7 @@ SUSPICIOUS_SIGMAS = 4.0
 """From so many standard deviations on a record is marked."""
 
 PHASES = {
-    Phase.IDENTIFY: "calibrating",
+    Phase.IDENTIFY: "measuring",
     Phase.BEFORE: "held-out poses, old geometry",
     Phase.AFTER: "held-out poses, new geometry",
     Phase.CONFIRM: "confirming records",

@@ -51,7 +51,7 @@ def question_view(
                 for number, choice in enumerate(question.choices, start=1)
             )
             return QuestionView(
-                title="The robot stands still: this went wrong",
+                title="Something went wrong, and the robot stands still",
                 paragraphs=(problem,),
                 instruction="Mend it, then press a number:",
                 choices=tuple(choices),
@@ -59,15 +59,8 @@ def question_view(
                 urgency=Urgency.ALARM,
             )
         case questions.UnreadyController(problem=problem, request=request):
-            return QuestionView(
-                title="The controller is not ready",
-                paragraphs=(f"{problem}.", request),
-                instruction="Press y or n.",
-                choices=(
-                    Choice("y", "yes", questions.YES, is_consent=True),
-                    Choice("n", "no", questions.NO),
-                ),
-            )
+            asked = f"{problem}.", request
+            return yes_or_no("The controller is not ready", asked, "yes", "no", otherwise=questions.NO)
 
 
 def _placement(place: questions.GaugePlacement, live: LiveSnapshot | None) -> QuestionView:
@@ -108,12 +101,21 @@ def _pose_text(pose: Pose) -> str:
     return f"{millimetres} mm; {degrees} deg"
 
 
-ABORTING = QuestionView(
-    title="End this run?",
-    paragraphs=("The robot stops after its step. What was measured is kept: r in 2 Preflight resumes it.",),
-    instruction="Press y or n.",
-    choices=(Choice("y", "yes, end it", questions.YES, is_consent=True), Choice("n", "no, go on", None)),
-)
+def yes_or_no(
+    title: str,
+    paragraphs: tuple[str, ...],
+    yes: str,
+    no: str,
+    value: str = questions.YES,
+    otherwise: str | None = None,
+) -> QuestionView:
+    """A question that is answered by y or n."""
+    choices = Choice("y", yes, value, is_consent=True), Choice("n", no, otherwise)
+    return QuestionView(title, paragraphs, "Press y or n.", choices)
+
+
+ENDING = "The robot stops in place. What was measured is kept: r in 2 Preflight resumes the run."
+ABORTING = yes_or_no("End this run?", (ENDING,), "yes, end it", "no, go on")
 
 
 AGAIN_FOLLOWS = (
@@ -124,15 +126,8 @@ AGAIN_FOLLOWS = (
 
 def again_question(record: str) -> QuestionView:
     """What a person confirms before a record that was taken is taken once more."""
-    return QuestionView(
-        title=f"Measure record {record} again?",
-        paragraphs=(AGAIN_FOLLOWS,),
-        instruction="Press y or n.",
-        choices=(
-            Choice("y", "yes, measure it again", questions.YES, is_consent=True),
-            Choice("n", "no, keep it", None),
-        ),
-    )
+    title = f"Measure record {record} again?"
+    return yes_or_no(title, (AGAIN_FOLLOWS,), "yes, measure it again", "no, keep it")
 
 
 def approval_refusal(gates: tuple[AcceptanceGate, ...]) -> str:

@@ -10,9 +10,9 @@ from hexacell.text.line_face import whole_event_text
 from hexacell.text.parameters import rows_of_run
 from hexacell.text.screens.banner import verdict_urgency
 from hexacell.text.screens.measuring import SUSPICIOUS_SIGMAS, accuracy_plot, off_of
-from hexacell.text.screens.questions import PERSON, approval_refusal
+from hexacell.text.screens.questions import PERSON, approval_refusal, yes_or_no
 from hexacell.text.screens.run_picture import RunPicture
-from hexacell.text.screens.views import Choice, Column, Line, PlotView, QuestionView, Row, Series, Urgency
+from hexacell.text.screens.views import Column, Line, PlotView, QuestionView, Row, Series, Urgency
 from hexacell.text.verdict import VERDICT_MEANINGS, teaching_sentence
 from hexacell.verdict.verification import DeviationStatistics
 from procedures.run.keys import Phase
@@ -23,14 +23,14 @@ PROPOSAL_WAITS = "Its proposal can still be written: w asks for it, with the cha
 
 PARAMETER_COLUMNS = (
     Column("parameter", 13),
-    *(Column(name, 12, is_figure=True) for name in ("config now", "new config", "changed by")),
-    Column("sigma", 9, is_figure=True),
+    *(Column(name, 11, is_figure=True) for name in ("config now", "new config", "changed by")),
+    Column("sigma", 7, is_figure=True),
     Column("  meaning", 24),
 )
 
 FRAMES = (
     "The config's numbers are in the frames that move your taught points least. What changed, and its "
-    "sigma, are in the frames {frame}, where a choice of frames is no change."
+    "sigma, are in others ({frame}), where a choice of frames is no change."
 )
 
 
@@ -190,6 +190,5 @@ def rollback_question(run: str, *, is_in_controller: bool) -> QuestionView:
         title = f"Undo {run}: restore the previous config of the controller?"
         follows = "The errors that this run corrected return."
     reload = "The controller has to read the file anew: restart or reload it then, before anything moves."
-    consent = Choice("y", "yes, replace the config, bit for bit", PERSON, is_consent=True)
-    decline = Choice("n", "no, leave it as it is", None)
-    return QuestionView(title, (follows, reload), "Press y or n.", (consent, decline))
+    yes, no = "yes, replace the config, bit for bit", "no, leave it as it is"
+    return yes_or_no(title, (follows, reload), yes, no, PERSON)

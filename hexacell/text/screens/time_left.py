@@ -19,10 +19,11 @@ def remaining(picture: RunPicture, settings: CellSettings | None) -> str:
     done, planned = readings(picture)
     if planned <= 0:
         return f"{done} readings so far" if done else ""
-    left = max(0, planned - done)
+    if (left := planned - done) <= 0:
+        return ""
     minutes = _minutes(picture, settings, left)
-    about = "" if minutes is None else f"About {duration(minutes)} left: "
-    return f"{about}at most {left} of {planned} readings"
+    about = "" if minutes is None else f"About {duration(minutes)}, "
+    return f"{about}at most {left} readings left"
 
 
 def readings(picture: RunPicture) -> tuple[int, int]:

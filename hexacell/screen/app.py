@@ -161,6 +161,8 @@ class TechnicianApp(App[int]):
         if self.model.run.runs != self._runs_seen:  # a new run is shown; overlays come after that
             self._runs_seen = self.model.run.runs
             self.action_show("measure")
+            with suppress(KeyError, NoMatches):  # it is not made yet
+                self.get_screen_stack("review")[0].query_one("#details").scroll_home(animate=False)
         elif self._is_whole:
             self._overlay_news(self.model)
 

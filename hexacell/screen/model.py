@@ -267,7 +267,7 @@ class ScreenModel:
             case ScreenAction.MEASURE_AGAIN:
                 raise UsageError("no point is being measured now")
             case ScreenAction.ABORT:
-                await self.run.give(Abort())
+                await self.run.give(Abort("a person ended it"))
             case ScreenAction.TAKE_CONTROL if connection is not None:
                 await connection.take_control()
             case ScreenAction.CHECK:

@@ -30,8 +30,6 @@ LONGEST_TYPED = 200
 class PlacingPanel(Horizontal):
     """Ball and gauges as mounted, and beside them where each plunger stands in its travel."""
 
-    are_in_place = False
-
     def __init__(self) -> None:
         self._picture, self._gauges = Static(id="placing-picture"), LinePanel(id="placing-gauges")
         super().__init__(self._picture, self._gauges, id="placing")

@@ -119,14 +119,6 @@ class ReviewScreen(TabScreen):
 
     TAB = "review"
     AUTO_FOCUS = "#details"
-    _run = 0
-
-    def draw(self, model: ScreenModel, has_effect: Callable[[str], bool]) -> None:
-        """Show what is so now; another run from its beginning."""
-        super().draw(model, has_effect)
-        if model.run.runs != self._run:
-            self._run = model.run.runs
-            self.query_one("#details").scroll_home(animate=False)
 
     def _parts(self) -> ComposeResult:
         from hexacell.text.screens.reviewing import PARAMETER_COLUMNS  # noqa: PLC0415 - see above

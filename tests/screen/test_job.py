@@ -137,10 +137,10 @@ async def test_one_key_each_for_who_is_in_control(cell, run, history, opened) ->
     async with opened(workplace_of(cell, run, history[:300])) as pilot:
         await until_shown(pilot, "point 5")
         await press(pilot, "P", "u", "m", "p", "a", "n")
-        assert Abort() not in run.given, "it is confirmed first"
+        assert Pause() == run.given[-1], "to end it is confirmed first"
         await press(pilot, "a", "y")
         again = MeasureAgain(SetKey(phase=Phase.IDENTIFY, point=5))
-        assert run.given == [Pause(at_once=True), Undo(), again, Pause(), Abort()]
+        assert run.given == [Pause(at_once=True), Undo(), again, Pause(), Abort("a person ended it")]
         run.tell(messages.StatusChanged(status=Status.PAUSED))
         await until_shown(pilot, "PAUSED")
         await press(pilot, "p")

@@ -1,9 +1,11 @@
 """A cell file made from a few answers: each is checked by the rules of the whole file."""
 
 import tomllib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +26,8 @@ from hexacell.storage.output_files import NEW_CELL, OutputFile
 from hexacell.storage.toml_document import KeyPath, TomlDocument
 
 HEADER = "# Made from a few answers. `hexacell cell show` prints it with every default.\n\n"
-CELLS = {
-    "hexaglide": "simulated-hexaglide",
-    "gough-stewart": "gough-stewart",
-    "six-rails": "linapod",
-    "rotary-cranks": "rotary-cranks",
-}
-"""The simulated cell of each mechanism; answers that are proposed are from there."""
+CELLS = ("simulated-hexaglide", "gough-stewart", "linapod", "rotary-cranks")
+"""A simulated cell of each mechanism; answers that are proposed are from there."""
 KEPT_SECTIONS = ("robot", "tolerances", "limits", "speed")
 """Its sections in which every answer has a place, and limits are stated with care."""
 GAUGE_AXES = "xyz"
@@ -154,20 +151,23 @@ class CellDraft:
     @property
     def mechanism(self) -> Mechanism:
         """That whose geometry the controller's config has."""
-        config = self.given.get("config", "").strip() or self._likely_config()
-        return _mechanism_of(self.path.parent / config)
+        return self._like[1]
+
+    @property
+    def _like(self) -> tuple[Document, Mechanism]:
+        return _cell_like(self.path.parent / (self.given.get("config", "").strip() or self._likely_config))
 
     def answers(self) -> tuple[CellAnswer, ...]:
         """All that is asked, in order."""
-        bundled = _bundled(self.mechanism)
+        bundled, mechanism = self._like
+        joints = _joint_limits(mechanism)
         (tolerance, size), *_ = bundled["tolerances"].items()
-        joints = _joint_limits(self.mechanism)
-        travel = _text_of(bundled["limits"][key] for key in joints)
+        travel = " ".join(f"{bundled['limits'][key]:g}" for key in joints)
         middle, aside, *_ = bundled["identification"]["points"]
-        points = _text_of([*middle, middle[1] - aside[1]])
+        points = " ".join(f"{one:g}" for one in (*middle, middle[1] - aside[1]))
         return (
             CellAnswer("name", ("name",), self.path.stem[:40]),
-            CellAnswer("config", ("controller", "config"), self._likely_config(), put=self._put_config),
+            CellAnswer("config", ("controller", "config"), self._likely_config, put=self._put_config),
             CellAnswer("tolerance", ("tolerances", tolerance), f"{size:g}", put=_put_tolerance),
             CellAnswer("host", ("controller", "host"), "127.0.0.1"),
             CellAnswer("port", ("controller", "port"), "5007", _whole),
@@ -218,7 +218,7 @@ class CellDraft:
 
     def _text(self) -> str:
         """The file; raises ``ValueError`` where an answer cannot be read."""
-        bundled = _bundled(self.mechanism)
+        bundled, _ = self._like
         document: Document = {
             "version": 1,
             "name": "",
@@ -253,12 +253,13 @@ class CellDraft:
         limits = _numbers(given, 2, "the smallest and the largest position")
         document["limits"] |= zip(_joint_limits(self.mechanism), limits, strict=True)
 
+    @cached_property
     def _likely_config(self) -> str:
         """The only file beside it that is a controller's config, or a usual name."""
         found = []
         for path in sorted(self.path.parent.glob("*.toml")):
             with suppress(HexacellError):
-                native_layout(_mechanism_of(path).parameters).read(path)
+                native_layout(_cell_like(path)[1].parameters).read(path)
                 found.append(path.name)
         return found[0] if len(found) == 1 else "robot.toml"
 
@@ -268,20 +269,15 @@ def _joint_limits(mechanism: Mechanism) -> tuple[str, str]:
     return f"joint_min_{unit}", f"joint_max_{unit}"
 
 
-def _bundled(mechanism: Mechanism) -> Document:
-    return tomllib.loads(read_text(bundled_config(CELLS[mechanism.name])))
-
-
-def _mechanism_of(config: Path) -> Mechanism:
-    """That whose parameters a controller's config names, most of all; the first where it names none."""
+def _cell_like(config: Path) -> tuple[Document, Mechanism]:
+    """The simulated cell whose drawing has most of what a controller's config names."""
     named = set[str]()
     with suppress(HexacellError, ValueError, LookupError, TypeError):  # told when it is read
         named = {*tomllib.loads(read_text(config))["geometry"]}
-    every = [mechanism_of(name, encoder_scales=False) for name in CELLS]
-    return max(
-        every, key=lambda one: len(named & {*one.parameters.shapes}) - len({*one.parameters.shapes} - named)
-    )
+    found = deepcopy(min(_cells(), key=lambda one: len(named ^ {*one["robot"]["nominal"]})))
+    return found, mechanism_of(found["robot"]["mechanism"], encoder_scales=False)
 
 
-def _text_of(numbers: Iterable[float]) -> str:
-    return " ".join(f"{one:g}" for one in numbers)
+@cache
+def _cells() -> list[Document]:
+    return [tomllib.loads(read_text(bundled_config(name))) for name in CELLS]

@@ -45,7 +45,7 @@ def run_banner(picture: RunPicture, settings: CellSettings | None) -> Banner:
         return NO_RUN
     if picture.is_recorded:
         word = "RECORDED" if picture.state.verdict is None else picture.state.verdict.upper()
-        rest = "space plays, arrows step, + and - change the speed; nothing moves"
+        rest = "space plays, arrows step, + and - the speed; nothing moves"
         urgency = verdict_urgency(picture.state.verdict)
         return Banner(word, _capital(_recorded(picture)), _following(picture, settings), rest, urgency)
     if picture.status is Status.ENDED:
@@ -56,8 +56,8 @@ def run_banner(picture: RunPicture, settings: CellSettings | None) -> Banner:
     word, action, urgency = _word(picture), f"Nothing to do: {_doing(picture)}", Urgency.CALM
     if picture.status is Status.PAUSED:
         key = "p" if picture.may_command else "c to take over, then p"
-        action = f"Press {key} to go on; the robot stands still"
-        word, urgency = "PAUSED", Urgency.ATTENTION
+        word, action = "PAUSED", f"Press {key} to go on; the robot stands still"
+        urgency = Urgency.ATTENTION
     elif picture.status is Status.PAUSING:
         word, urgency = "PAUSING", Urgency.ATTENTION
     elif picture.status is Status.FAULTED:
@@ -66,6 +66,8 @@ def run_banner(picture: RunPicture, settings: CellSettings | None) -> Banner:
 
 
 def _recorded(picture: RunPicture) -> str:
+    if isinstance(picture.setback, events.Interrupted):
+        return f"It ended early: {picture.setback.reason}"
     return picture.state.ended.line if picture.state.ended is not None else _doing(picture)
 
 
@@ -81,7 +83,7 @@ def _ended(picture: RunPicture) -> Banner:
         following = "4 Review shows the result, 5 History all runs."
         return Banner(word, line, following, "Nothing moves.", verdict_urgency(verdict))
     if why := picture.why_not_written:
-        following = "Press 5: w there writes its proposal after all; 2 and r ask again."
+        following = "Press 5: w there writes it after all; 2 and r ask again."
         return Banner("NOT WRITTEN", _capital(why), following, "", Urgency.ATTENTION)
     reason, action = "its process is gone without a word; the robot may still move", RESUMING
     if isinstance(picture.setback, events.Interrupted):
@@ -108,6 +110,8 @@ def _word(picture: RunPicture) -> str:
     step = picture.step
     if isinstance(step, Move):
         return "ROBOT MOVES"
+    if step is None and not picture.state.sets:
+        return "STARTING"
     return "COMPUTING" if step is not None and step.moves_nothing else "MEASURING"
 
 
@@ -124,7 +128,7 @@ def _doing(picture: RunPicture) -> str:
 
 def _following(picture: RunPicture, settings: CellSettings | None) -> str:
     at, step = picture.at, picture.step
-    if picture.state.ended is not None:
+    if picture.state.ended is not None or isinstance(picture.setback, events.Interrupted):
         return "4 Review shows the result"
     if at is None or (step is not None and step.moves_nothing):
         otherwise = "the next pose" if picture.state.sets else "the robot goes to the first point"

@@ -14,8 +14,6 @@ WIDE_BAR = 33
 OLD_S = 2.0
 """Silence of a device from which it is shown, s."""
 
-NO_VALUE = "Nothing is read now."
-
 
 def device_cards(live: LiveSnapshot | None, later_s: float) -> tuple[Card, ...]:
     """A card for each gauge, for the encoders, the controller and the stop line.
@@ -91,7 +89,7 @@ def gauge_lines(
         zero_mm: what the gauges showed along base x, y, z when they were zeroed.
     """
     if live is None:
-        return [(NO_VALUE, Urgency.CALM)]
+        return [("Nothing is read now.", Urgency.CALM)]
     lines = [(_gauge_line(one, later_s, zero_mm), urgency_of(one.problem)) for one in live.gauges]
     encoders, controller = _encoder_card(live.encoders, later_s), _controller_card(live.controller, later_s)
     others = [

@@ -13,7 +13,7 @@ from hexacell.text.screens.views import Column, FaultView, PlotView, Row, Series
 from procedures.run.keys import Phase
 from procedures.steps import events
 
-RESUMABLE = "What was measured is kept. Mend it, then press r in 2 Preflight, which resumes the run."
+RESUMABLE = "What was measured is kept. Mend what is to be mended, then r in 2 Preflight resumes the run."
 
 SUSPICIOUS_SIGMAS = 4.0
 """From so many standard deviations on a record is marked."""

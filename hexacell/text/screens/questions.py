@@ -60,7 +60,8 @@ def question_view(
             )
         case questions.UnreadyController(problem=problem, request=request):
             asked = f"{problem}.", request
-            return yes_or_no("The controller is not ready", asked, "yes", "no", otherwise=questions.NO)
+            no = "no, end the run; it can be resumed"
+            return yes_or_no("The controller is not ready", asked, "yes", no, otherwise=questions.NO)
 
 
 def _placement(place: questions.GaugePlacement, live: LiveSnapshot | None) -> QuestionView:
@@ -118,16 +119,13 @@ ENDING = "The robot stops in place. What was measured is kept: r in 2 Preflight 
 ABORTING = yes_or_no("End this run?", (ENDING,), "yes, end it", "no, go on")
 
 
-AGAIN_FOLLOWS = (
-    "The robot goes back to the reference of its point. Where that shows something else by now, because "
-    "the gauges have been moved, the whole point is measured again."
-)
-
-
 def again_question(record: str) -> QuestionView:
     """What a person confirms before a record that was taken is taken once more."""
-    title = f"Measure record {record} again?"
-    return yes_or_no(title, (AGAIN_FOLLOWS,), "yes, measure it again", "no, keep it")
+    follows = (
+        "The robot goes back to the reference of its point. Where that shows something else by now, as "
+        "the gauges have been moved, the whole point is measured again, and the present one after it."
+    )
+    return yes_or_no(f"Measure record {record} again?", (follows,), "yes, measure it again", "no, keep it")
 
 
 def approval_refusal(gates: tuple[AcceptanceGate, ...]) -> str:

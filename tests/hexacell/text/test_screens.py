@@ -160,6 +160,13 @@ def test_a_run_that_cannot_be_resumed_says_so_and_one_that_begins_says_what_come
     assert run_banner(picture, None).action == "Undo the change"
 
 
+def test_a_recorded_run_that_ended_early_says_why() -> None:
+    early = recorded(events.Interrupted(reason="it was declined", exit_code=1))
+    banner = run_banner(pictured(described(is_recorded=True), early), None)
+    assert banner.action == "It ended early: it was declined"
+    assert "next" not in banner.following
+
+
 def test_forecasts_with_records_that_were_discarded_are_not_drawn() -> None:
     story, forecast = Story(POINT), Forecast(now_mm=1.0, next_mm=0.9, end_mm=0.1, records=9, minutes=1.0)
     expected = Expectation(

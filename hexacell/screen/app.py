@@ -161,12 +161,10 @@ class TechnicianApp(App[int]):
         if self.model.run.runs != self._runs_seen:  # a new run is shown; overlays come after that
             self._runs_seen = self.model.run.runs
             self.action_show("measure")
+            with suppress(KeyError, NoMatches):  # it is not made yet
+                self.get_screen_stack("review")[0].query_one("#details").scroll_home(animate=False)
         elif self._is_whole:
-            self._overlay_question(self.model)
-            view, number = self.model.fault(), self.model.fault_number
-            if view is not None and number != self._fault_seen:
-                self.push_screen(overlays.FaultOverlay(view))
-            self._fault_seen = number
+            self._overlay_news(self.model)
 
     @property
     def _is_whole(self) -> bool:
@@ -174,6 +172,17 @@ class TechnicianApp(App[int]):
         if not isinstance(self.screen, tabs.TabScreen):
             return True
         return any(line.outer_size.width == self.size.width for line in self.screen.query(KeyLine))
+
+    def _overlay_news(self, model: ScreenModel) -> None:
+        """A question or fault; an older fault of the run, which nobody has closed, is not to lie below."""
+        view, number, front = model.fault(), model.fault_number, self.screen
+        kept = {0} if model.question() else {0, number}
+        if isinstance(front, overlays.FaultOverlay) and front.number not in kept:
+            front.dismiss()
+        self._overlay_question(model)
+        if view is not None and number != self._fault_seen:
+            self.push_screen(overlays.FaultOverlay(view, number))
+        self._fault_seen = number
 
     def _overlay_question(self, model: ScreenModel) -> None:
         number, view = model.run.questions, model.question()

@@ -33,6 +33,7 @@ from hexacell.text.screens.views import Banner, FaultView, QuestionView, Urgency
 from procedures.calibration.calibration import Mode
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Abort, Answer, MeasureAgain, Pause, Resume, Undo
+from procedures.run.questions import StepFailure
 from procedures.steps import events
 
 SPEEDS = (0.0, 1.0, 10.0, 60.0, 600.0)
@@ -204,12 +205,15 @@ class ScreenModel:
         return question_view(picture.question, picture.live)
 
     def fault(self) -> FaultView | None:
-        """The latest fault that nobody is asked about; those of a recorded run are long past."""
-        picture = self.run.picture
-        is_asked = isinstance(picture.setback, events.Failed) and picture.setback.is_of_a_question
-        if picture.setback is None or is_asked or picture.is_recorded or picture.why_not_written:
-            return None
-        return fault_view(picture.setback)
+        """The latest fault; those of a recorded run are long past, and what was declined is none.
+
+        None either where a person is asked how to continue, which says what went wrong, or has answered.
+        """
+        picture, setback = self.run.picture, self.run.picture.setback
+        is_told = isinstance(getattr(picture.question, "subject", None), StepFailure)
+        is_told = is_told or (isinstance(setback, events.Failed) and setback.is_of_a_question)
+        is_told = is_told or bool(picture.why_not_written) or picture.is_recorded
+        return None if setback is None or is_told else fault_view(setback)
 
     # Actions.
 
@@ -224,8 +228,9 @@ class ScreenModel:
         asked = ScreenAction
         match action:
             case asked.PAUSE | asked.PAUSE_AT_ONCE | asked.UNDO | asked.MEASURE_AGAIN | asked.ABORT:
-                is_over = self.run.picture.status is Status.ENDED
-                return self._is_running and self.run.picture.may_command and not is_over
+                is_over, needs = self.run.picture.status is Status.ENDED, {asked.UNDO, asked.MEASURE_AGAIN}
+                is_void = action in needs and not records_by_name(self.run.picture)
+                return self.may_leave_run and not is_over and not is_void
             case asked.STEP | asked.PLAY:
                 return self._recording is not None
             case asked.TAKE_CONTROL:
@@ -268,7 +273,7 @@ class ScreenModel:
             case ScreenAction.MEASURE_AGAIN:
                 raise UsageError("no point is being measured now")
             case ScreenAction.ABORT:
-                await self.run.give(Abort())
+                await self.run.give(Abort("a person ended it"))
             case ScreenAction.TAKE_CONTROL if connection is not None:
                 await connection.take_control()
             case ScreenAction.CHECK:
@@ -338,6 +343,8 @@ class ScreenModel:
         """Step to an end or by a number of events; play or halt, ``+`` faster, ``-`` slower."""
         if action is ScreenAction.PLAY:
             cursor = self.run.picture.cursor
+            if cursor is not None and cursor.sequence == cursor.last and not argument:
+                recording.jump(1)  # from its end there is nothing to play
             speed = 0.0 if cursor is None else cursor.speed
             place = SPEEDS.index(speed) if speed in SPEEDS else 0
             wanted = {"+": place + 1, "-": place - 1}.get(argument, 0 if place else 1)

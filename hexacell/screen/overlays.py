@@ -169,16 +169,16 @@ class QuestionOverlay(AnswerOverlay[None]):
 
 
 class FaultOverlay(ModalScreen[None]):
-    """Stays until it was read."""
+    """Stays until it was read; of a run, with the ``number`` of its fault, until there is another."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         ("enter,escape,space", "dismiss", "Read"),
         ("a", "app.perform('abort')", "Abort"),
     ]
 
-    def __init__(self, view: views.FaultView) -> None:
+    def __init__(self, view: views.FaultView, number: int = 0) -> None:
         super().__init__()
-        self._view = view
+        self._view, self.number = view, number
 
     def compose(self) -> ComposeResult:
         """Title, cause, next action."""

@@ -86,7 +86,7 @@ class PlotPanel(Vertical):
         plot.set_xlimits(*xs)
         plot.set_ylimits(*ys)
         plot.margin_left, plot.margin_top, plot.margin_bottom = 7, 0, 1
-        plot.set_y_formatter(_formatter(is_logarithmic=view.is_logarithmic))
+        plot.set_y_formatter(_formatter(plot, is_logarithmic=view.is_logarithmic))
         self._across = xs
         self.on_resize()
         colours = self.app.theme_variables
@@ -107,7 +107,7 @@ def _range(values: Sequence[float]) -> tuple[float, float]:
     return low - free, high + free
 
 
-def _formatter(*, is_logarithmic: bool) -> AxisFormatter:
+def _formatter(plot: PlotWidget, *, is_logarithmic: bool) -> AxisFormatter:
     from textual_plot import NumericAxisFormatter  # noqa: PLC0415 - see above
 
     if not is_logarithmic:
@@ -117,7 +117,8 @@ def _formatter(*, is_logarithmic: bool) -> AxisFormatter:
         """Round values on an axis of logarithms."""
 
         def get_ticks(self, min_: float, max_: float, max_ticks: int = 8) -> list[float]:
-            return decades(min_, max_)[:: 1 + len(decades(min_, max_)) // max_ticks]
+            found, most = decades(min_, max_), min(max_ticks, max(2, plot.size.height // 2))
+            return found[:: 1 + len(found) // most]
 
         def get_labels_for_ticks(self, ticks: Sequence[float]) -> list[str]:
             return [f"{10.0**one:.3g}" for one in ticks]

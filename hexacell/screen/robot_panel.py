@@ -33,7 +33,7 @@ class RobotPanel(Static):
 
         room = self.content_region.size
         if self._scene is None or room.width < FEWEST_COLUMNS or room.height < FEWEST_ROWS:
-            self.update("")
+            self.update("" if self._scene is None else "A larger window shows it.")
             return
         lines = braille_lines(self._scene, room.width, room.height)
         is_grey = self._theme == "monochrome"

@@ -21,6 +21,7 @@ from hexacell.services.history.journal_soundness import read_sound
 from hexacell.services.history.past_runs import compare_runs, parameter_trends, past_runs
 from hexacell.services.history.resumption import LATEST, run_to_resume
 from hexacell.services.history.run_index import PastRun
+from hexacell.services.history.run_summary import is_applied_later
 from hexacell.services.preflight import exposure_warnings, toggle_exclusion
 from hexacell.services.write_back.config_rollback import roll_back_config
 from hexacell.services.write_back.proposals import apply_proposal, approval_question, read_proposal
@@ -110,8 +111,11 @@ class Workplace:
         return tuple(drift_text(found).splitlines())
 
     async def is_in_controller(self, run: str) -> bool:
-        """Whether the controller's config is the one that a run wrote."""
-        return any(one.name == run and one.is_in_controller for one in await self.runs())
+        """Whether the controller's config is the one that a run wrote; ``UsageError`` if it wrote none."""
+        one = next((one for one in await self.runs() if one.name == run), None)
+        if one is None or not (one.summary.has_written or is_applied_later(one.folder)):
+            raise UsageError(f"{run} has written no config", action="Choose a run that has")
+        return one.is_in_controller
 
     async def approval(self, run: str) -> Question:
         """The question that a person is asked before the open proposal of a run is written."""

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from hexacell.services.write_back.proposals import AppliedProposal
     from procedures.run.questions import PendingChange
 
-RELOAD = "Restart or reload the controller before it moves: until then it has the previous geometry."
+RELOAD = "Restart or reload the controller before it moves: until then it uses what it read before."
 
 
 def applied_text(applied: AppliedProposal) -> str:

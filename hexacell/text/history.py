@@ -44,10 +44,10 @@ def standing(run: PastRun) -> str:
         return "not begun"
     if run.is_in_controller:
         return "in controller" if run.summary.is_over else "unverified!"
-    if not run.summary.is_over:
-        return "not over"
     if run.summary.has_proposal:
         return "proposal"
+    if not run.summary.is_over:
+        return "not over"
     return "replaced" if run.summary.has_written else ""
 
 

@@ -90,12 +90,13 @@ def gates(
         ),
     ]
     if isfinite(largest_change_mm):
+        units = " or ".join(sorted({kind.unit.shown for kind in identified.geometry.parameters.kinds}))
         checked.append(
             AcceptanceGate(  # a robot that moves far from where it did may collide
                 name="small change",
                 passed=change_mm <= largest_change_mm,
-                sentence=f"The largest change is {shown(change_mm)}, the choice of frames apart "
-                f"(limit without a person {largest_change_mm:g} mm).",
+                sentence=f"The largest change is {shown(change_mm, unit=units)}, the choice of frames "
+                f"apart (limit without a person {largest_change_mm:g} {units}).",
                 needs_person=True,
                 needs_cell_name=not change_mm <= largest_change_mm,
             )

@@ -18,7 +18,8 @@ from hexacell.screen.app import TechnicianApp
 from hexacell.screen.further_screens import AssistantScreen
 from hexacell.screen.model import ScreenModel
 from hexacell.services.devices.device_search import SearchFindings, draft_of
-from hexacell.services.devices.first_cell import CellDraft
+from hexacell.services.devices.first_cell import CELLS, CellDraft
+from hexacell.text.screens.first_questions import FirstCellAssistant
 from tests.screen.test_history_screen import WithoutDevices
 from tests.screen.test_job import press, shown, until_shown
 from tests.waiting import until
@@ -75,6 +76,19 @@ async def test_the_questions_lead_to_a_valid_cell_file(path: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize("cell", CELLS)
+def test_what_is_proposed_is_a_cell_of_the_mechanism_of_the_config(tmp_path, cell) -> None:
+    config = bundled_config(cell).with_name(f"{cell}.controller.toml")
+    shutil.copy(config, tmp_path)
+    assistant = FirstCellAssistant(tmp_path / "new.toml")
+    while not assistant.is_done:
+        assistant.answer(assistant.suggestion)
+        assert assistant.problem == ""
+    settings, bundled = load_cell(tmp_path / "new.toml").settings, load_cell(bundled_config(cell)).settings
+    assert settings.robot == bundled.robot
+    assert settings.limits == bundled.limits
+
+
 def test_a_wrong_answer_is_refused_with_its_reason(path: Path) -> None:
     draft = CellDraft(path)
     for name, given, problem in (
@@ -85,8 +99,8 @@ def test_a_wrong_answer_is_refused_with_its_reason(path: Path) -> None:
         ("tolerance", "-1", "must be more than 0"),
         ("port", "99999999", "must be 65535 or less"),
         ("port", "1.5", "'1.5' is no whole number"),
-        ("sliders", "5", "2 numbers are expected: the smallest and the largest position"),
-        ("sliders", "800 -800", "joint_m"),
+        ("joints", "5", "2 numbers are expected: the smallest and the largest position"),
+        ("joints", "800 -800", "joint_m"),
         ("protocol x", "foo", "it is one of cdi, digimatic-usb, heidenhain-nd"),
         ("sign y", "perhaps", "answer yes or no"),
         ("nodes", "1 1 2 3 4 5", "two encoders have the same node id"),

@@ -68,6 +68,8 @@ async def test_what_is_not_done_says_why_and_changes_nothing(cell: Cell, runs: l
         await until(lambda: bool(model.runs))
         with pytest.raises(UsageError, match=f"no run before {earlier} identified a geometry"):
             await model.perform(ScreenAction.COMPARE, earlier)
+        with pytest.raises(UsageError, match="nothing has written no config"):
+            await model.confirmation(ScreenAction.ROLL_BACK, "nothing")
         await model.perform(ScreenAction.DRIFT)
         assert model.shown("history")["comparison"][0][-1] == NO_DRIFT
         assert cell.config_path.read_bytes() == runs[1].after
@@ -96,6 +98,11 @@ async def test_a_recorded_run_is_watched_again_with_its_cursor_and_undone(cell, 
         await press(pilot, "right")
         await until_shown(pilot, " 2/")
         await press(pilot, "left", "end")
+        await until(lambda: shown(pilot) == last)
+        await press(pilot, "space")  # from the end it is played from the beginning
+        await until_shown(pilot, " x1")
+        assert shown(pilot) != last
+        await press(pilot, "space", "end")
         await until(lambda: shown(pilot) == last)
         await press(pilot, "5", "b")
         await until_asked(pilot)

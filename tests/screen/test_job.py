@@ -9,14 +9,14 @@ from textual.widgets import DataTable, Static
 
 from drivers.interfaces import StartupAction
 from hexacell.cell.loader import Cell
-from hexacell.cell.recovery import Action
+from hexacell.cell.recovery import Action, FailureKind
 from hexacell.kinematics.pose import Pose
 from hexacell.run_process import messages
 from hexacell.run_process.client import LOST
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.child import Preflight
 from hexacell.screen.overlays import ConfirmOverlay, FaultOverlay, QuestionOverlay
-from hexacell.screen.widgets import RecordTable
+from hexacell.screen.widgets import KeyLine, RecordTable
 from hexacell.text.screens.measuring import RESUMABLE
 from hexacell.text.screens.views import ChecklistItem, Mark
 from procedures.engine.command_loop import Status
@@ -137,16 +137,16 @@ async def test_one_key_each_for_who_is_in_control(cell, run, history, opened) ->
     async with opened(workplace_of(cell, run, history[:300])) as pilot:
         await until_shown(pilot, "point 5")
         await press(pilot, "P", "u", "m", "p", "a", "n")
-        assert Abort() not in run.given, "it is confirmed first"
+        assert Pause() == run.given[-1], "to end it is confirmed first"
         await press(pilot, "a", "y")
         again = MeasureAgain(SetKey(phase=Phase.IDENTIFY, point=5))
-        assert run.given == [Pause(at_once=True), Undo(), again, Pause(), Abort()]
+        assert run.given == [Pause(at_once=True), Undo(), again, Pause(), Abort("a person ended it")]
         run.tell(messages.StatusChanged(status=Status.PAUSED))
         await until_shown(pilot, "PAUSED")
         await press(pilot, "p")
         assert run.given.pop() == Resume()
         run.tell(messages.ControlChanged(is_in_control=False, who="grace"))
-        await until_shown(pilot, "You only watch: grace is in control; c takes over")
+        await until_shown(pilot, "You only watch; c takes over")
         await press(pilot, "p", "c")
         assert len(run.given) == 5
         assert run.taken == 1
@@ -170,6 +170,51 @@ async def test_motion_begins_on_an_explicit_yes_and_a_fault_says_what_to_do(cell
         await until_shown(pilot, "try the same again")
         await press(pilot, "1")
         assert run.given == [Answer("yes"), Answer("retry")]
+
+
+async def test_of_faults_and_questions_only_what_waits_now_is_shown_and_all_of_it(
+    cell, run, history, opened
+):
+    lost = f"gauge y: port /tmp/{'long/' * 20}y was lost. Plug it in and open the device again"
+    failed = events.Failed(
+        step=None, failure=FailureKind.LINK_LOST, attempt=1, reason=lost, action=Action.ASK
+    )
+    choices = (Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ABORT)
+    async with opened(workplace_of(cell, run, history[:300])) as pilot:
+        for guard in (Guard.GAUGE_END, Guard.DRIFT):
+            run.record([tripped_by(guard)])
+            await until_shown(pilot, f"Stopped by a guard: {guard.value}")
+            assert len(pilot.app.screen_stack) == 2
+        run.tell(snapshot(y={"problem": lost}))
+        run.record([failed])
+        run.ask(ask_recovery(lost, choices))
+        await until_shown(pilot, "Mend it, then press a number")
+        await settled(pilot)
+        assert [type(one) for one in pilot.app.screen_stack[1:]] == [QuestionOverlay]
+        last = pilot.app.screen.query(".choice").last()
+        assert pilot.app.screen.get_widget_at(last.region.x, last.region.y)[0] is last
+        chosen = failed.model_copy(update={"action": Action.RETRY, "asked": True})
+        run.record([tripped_by(Guard.STALE), chosen])
+        run.close_question()
+        await until(lambda: len(pilot.app.screen_stack) == 1)
+        await settled(pilot)
+        assert len(pilot.app.screen_stack) == 1
+
+
+async def test_what_needs_a_record_is_offered_once_there_is_one(cell, run, opened, history) -> None:
+    async with opened(workplace_of(cell, run, history[:PLACED_AT])) as pilot:
+        keys = pilot.app.screen.query_one(KeyLine)
+        assert "Pause" in str(keys.content)
+        assert not any(word in str(keys.content) for word in ("Undo", "Point again", "Record again"))
+        run.record(history[PLACED_AT:300])
+        await until(lambda: "Undo" in str(pilot.app.screen.query_one(KeyLine).content))
+
+
+async def test_every_parameter_is_in_the_page_of_the_review(cell, run, history, opened) -> None:
+    async with opened(workplace_of(cell, run, history[:PROPOSED])) as pilot:
+        await press(pilot, "4")
+        table = pilot.app.screen.query_one("#parameters", DataTable)
+        await until(lambda: table.row_count > 30 and table.size.height > table.row_count)
 
 
 def tripped_by(guard: Guard) -> events.Tripped:

@@ -3,7 +3,9 @@
 import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field
+from copy import deepcopy
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -13,20 +15,21 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.by_mechanism import cell_model
 from hexacell.cell.described_devices import DESCRIBED_GAUGES
 from hexacell.cell.loader import load_cell, validated
-from hexacell.cell.robot import DEFAULT_MECHANISM
-from hexacell.config.layout import ConfigLayout
+from hexacell.cell.robot import mechanism_of
 from hexacell.config.toml_format import native_layout
 from hexacell.errors import FileError, HexacellError, flatten_errors
 from hexacell.kinematics.mechanism import Mechanism
-from hexacell.plugins import Group, created, names
+from hexacell.plugins import Group, names
 from hexacell.services.offline import require_stated_poses
 from hexacell.storage.atomic_files import read_text
 from hexacell.storage.output_files import NEW_CELL, OutputFile
 from hexacell.storage.toml_document import KeyPath, TomlDocument
 
 HEADER = "# Made from a few answers. `hexacell cell show` prints it with every default.\n\n"
-KEPT_SECTIONS = ("robot", "limits", "speed")
-"""Sections of the simulated cell in which every answer has a place, and limits are stated with care."""
+CELLS = ("simulated-hexaglide", "gough-stewart", "linapod", "rotary-cranks")
+"""A simulated cell of each mechanism; answers that are proposed are from there."""
+KEPT_SECTIONS = ("robot", "tolerances", "limits", "speed")
+"""Its sections in which every answer has a place, and limits are stated with care."""
 GAUGE_AXES = "xyz"
 BITRATE = 500_000
 """Rate of a CAN bus for which none is stated, bit/s."""
@@ -106,12 +109,8 @@ def _sign(given: str) -> int:
 
 
 def _put_tolerance(document: Document, given: str) -> None:
-    document["tolerances"] = dict.fromkeys(("S_mm", "B_mm", "l_mm"), _number(given))
-
-
-def _put_sliders(document: Document, given: str) -> None:
-    low, high = _numbers(given, 2, "the smallest and the largest position")
-    document["limits"] |= {"joint_min_mm": low, "joint_max_mm": high}
+    lengths = [key for key in document["tolerances"] if key.endswith("_mm") and key != "ball_mm"]
+    document["tolerances"] |= dict.fromkeys(lengths, _number(given))
 
 
 def _put_bus(document: Document, given: str) -> None:
@@ -148,15 +147,30 @@ class CellDraft:
     found_gauges: tuple[Document, ...] = ()
     found_encoders: Document = field(default_factory=dict)
 
+    @property
+    def mechanism(self) -> Mechanism:
+        """That whose geometry the controller's config has."""
+        return self._like[1]
+
+    @property
+    def _like(self) -> tuple[Document, Mechanism]:
+        return _cell_like(self.path.parent / (self.given.get("config", "").strip() or self._likely_config))
+
     def answers(self) -> tuple[CellAnswer, ...]:
         """All that is asked, in order."""
+        bundled, mechanism = self._like
+        joints = _joint_limits(mechanism)
+        (tolerance, size), *_ = bundled["tolerances"].items()
+        travel = " ".join(f"{bundled['limits'][key]:g}" for key in joints)
+        middle, aside, *_ = bundled["identification"]["points"]
+        points = " ".join(f"{one:g}" for one in (*middle, middle[1] - aside[1]))
         return (
             CellAnswer("name", ("name",), self.path.stem[:40]),
-            CellAnswer("config", ("controller", "config"), self._likely_config(), put=self._put_config),
-            CellAnswer("tolerance", ("tolerances", "S_mm"), "7", put=_put_tolerance),
+            CellAnswer("config", ("controller", "config"), self._likely_config, put=self._put_config),
+            CellAnswer("tolerance", ("tolerances", tolerance), f"{size:g}", put=_put_tolerance),
             CellAnswer("host", ("controller", "host"), "127.0.0.1"),
             CellAnswer("port", ("controller", "port"), "5007", _whole),
-            CellAnswer("sliders", ("limits", "joint_min_mm"), "-800 800", put=_put_sliders),
+            CellAnswer("joints", ("limits", joints[0]), travel, put=self._put_joints),
             *(answer for number in range(len(GAUGE_AXES)) for answer in _gauge_answers(number)),
             CellAnswer("bus", ("encoders", "bus"), "socketcan can0", put=_put_bus),
             CellAnswer(
@@ -166,21 +180,22 @@ class CellDraft:
                 lambda given: [int(number) for number in _numbers(given, 6, "the node of each leg")],
             ),
             CellAnswer("plates", ("limits", "gauge_travel_mm"), "5", _number),
-            CellAnswer("points", ("identification", "points"), "0 0 550 200", put=_put_points),
+            CellAnswer("points", ("identification", "points"), points, put=_put_points),
         )
 
     def problem(self, name: str, given: str) -> str:
         """Why an answer cannot be taken; empty if it can."""
         if not given.isprintable():
             return "it has characters that cannot be shown; type it again"
-        [answer] = [one for one in self.answers() if one.name == name]
+        draft = replace(self, given={**self.given, name: given})
         try:
-            document = TomlDocument.parse(self._text({**self.given, name: given}), self.path)
+            document = TomlDocument.parse(draft._text(), self.path)
         except ValueError as error:
             return str(error)
         try:
-            validated(document, cell_model(DEFAULT_MECHANISM, encoder_scales=False), self.path)
+            validated(document, cell_model(draft.mechanism.name, encoder_scales=False), self.path)
         except HexacellError as error:
+            [answer] = [one for one in draft.answers() if one.name == name]
             # What it says of this answer, or of its section, by their lines.
             lines = {document.line_of(answer.path), document.line_of(answer.path[:-1])}
             for one in flatten_errors(error):
@@ -193,23 +208,22 @@ class CellDraft:
 
         The file is there already, it cannot be written, or a pose is out of reach.
         """
-        OutputFile(self.path, NEW_CELL).write(self._text(self.given).encode())
+        OutputFile(self.path, NEW_CELL).write(self._text().encode())
         try:
             require_stated_poses(load_cell(self.path))
         except HexacellError:
             self.path.unlink()
             raise
 
-    def _text(self, given: dict[str, str]) -> str:
+    def _text(self) -> str:
         """The file; raises ``ValueError`` where an answer cannot be read."""
-        bundled: Document = tomllib.loads(read_text(bundled_config("simulated-hexaglide")))
+        bundled, _ = self._like
         document: Document = {
             "version": 1,
             "name": "",
             "controller": {"config": "robot.toml"},
             "gauges": [{"name": axis, "axis": axis, "protocol": "sylvac"} for axis in GAUGE_AXES],
             "encoders": {"protocol": "cia406"},
-            "tolerances": {},
             "identification": {"points": []},
             "verification": {"points": []},
             **{name: bundled[name] for name in KEPT_SECTIONS},
@@ -218,8 +232,8 @@ class CellDraft:
             gauge.update(keys)
         document["encoders"] |= self.found_encoders
         for answer in self.answers():
-            if answer.name in given:
-                answer.enter(document, given[answer.name])
+            if answer.name in self.given:
+                answer.enter(document, self.given[answer.name])
             else:
                 with suppress(ValueError):  # it is asked later
                     answer.enter(document, answer.default)
@@ -229,21 +243,40 @@ class CellDraft:
         """Before it is calibrated, a controller has the geometry of the drawing."""
         document["controller"]["config"] = given.strip()
         try:
-            read = _config_layout().read(self.path.parent / given.strip())
+            read = native_layout(self.mechanism.parameters).read(self.path.parent / given.strip())
         except HexacellError as error:
             raise ValueError(str(error)) from error
         document["robot"]["nominal"] = read.geometry.document()
 
+    def _put_joints(self, document: Document, given: str) -> None:
+        limits = _numbers(given, 2, "the smallest and the largest position")
+        document["limits"] |= zip(_joint_limits(self.mechanism), limits, strict=True)
+
+    @cached_property
     def _likely_config(self) -> str:
         """The only file beside it that is a controller's config, or a usual name."""
         found = []
         for path in sorted(self.path.parent.glob("*.toml")):
             with suppress(HexacellError):
-                _config_layout().read(path)
+                native_layout(_cell_like(path)[1].parameters).read(path)
                 found.append(path.name)
         return found[0] if len(found) == 1 else "robot.toml"
 
 
-def _config_layout() -> ConfigLayout:
-    mechanism: Mechanism = created(Group.MECHANISMS, DEFAULT_MECHANISM)
-    return native_layout(mechanism.parameters)
+def _joint_limits(mechanism: Mechanism) -> tuple[str, str]:
+    unit = mechanism.words.joint_unit
+    return f"joint_min_{unit}", f"joint_max_{unit}"
+
+
+def _cell_like(config: Path) -> tuple[Document, Mechanism]:
+    """The simulated cell whose drawing has most of what a controller's config names."""
+    named = set[str]()
+    with suppress(HexacellError, ValueError, LookupError, TypeError):  # told when it is read
+        named = {*tomllib.loads(read_text(config))["geometry"]}
+    found = deepcopy(min(_cells(), key=lambda one: len(named ^ {*one["robot"]["nominal"]})))
+    return found, mechanism_of(found["robot"]["mechanism"], encoder_scales=False)
+
+
+@cache
+def _cells() -> list[Document]:
+    return [tomllib.loads(read_text(bundled_config(name))) for name in CELLS]

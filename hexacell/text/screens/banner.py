@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from hexacell.cell.model import CellSettings
+from hexacell.errors import ExitCode
 from hexacell.run_process.messages import HostFailed, LiveSnapshot
 from hexacell.text.layout import error_with_u
 from hexacell.text.screens.measuring import remaining
@@ -20,6 +21,7 @@ from procedures.steps.move import Move
 from procedures.steps.place import Place
 
 NO_RUN = Banner("NO RUN", "Press 2, look at everything, and start one with s", rest="Nothing moves.")
+RESUMING = "Press 2, then r resumes it: nothing is lost"
 STARTING = Banner("STARTING", "Nothing to do: a process of its own connects to the devices")
 AFTER_COMPUTING = {
     "identify": "the held-out poses are measured with the old geometry",
@@ -44,25 +46,30 @@ def run_banner(picture: RunPicture, settings: CellSettings | None) -> Banner:
         return NO_RUN
     if picture.is_recorded:
         word = "RECORDED" if picture.state.verdict is None else picture.state.verdict.upper()
-        rest = "space plays, arrows step, + and - change the speed; nothing moves"
+        rest = "space plays, arrows step, + and - the speed; nothing moves"
         urgency = verdict_urgency(picture.state.verdict)
-        shown = _doing(picture) if picture.state.ended is None else picture.state.ended.line
-        return Banner(word, _capital(shown), _following(picture, settings), rest, urgency)
+        return Banner(word, _capital(_recorded(picture)), _following(picture, settings), rest, urgency)
     if picture.status is Status.ENDED:
         return _ended(picture)
-    rest = ". ".join(filter(None, (remaining(picture, settings), _watching(picture))))
+    rest = ". ".join(filter(None, (remaining(picture, settings), _stopping(picture))))
     if picture.question is not None:
         return _asked(picture, rest)
-    is_computing = picture.step is not None and picture.step.moves_nothing
-    word = "COMPUTING" if is_computing else "ROBOT MOVES" if isinstance(picture.step, Move) else "MEASURING"
-    action, urgency = f"Nothing to do: {_doing(picture)}", Urgency.CALM
+    word, action, urgency = _word(picture), f"Nothing to do: {_doing(picture)}", Urgency.CALM
     if picture.status is Status.PAUSED:
-        word, action, urgency = "PAUSED", "Press p to go on; the robot stands still", Urgency.ATTENTION
+        key = "p" if picture.may_command else "c to take over, then p"
+        word, action = "PAUSED", f"Press {key} to go on; the robot stands still"
+        urgency = Urgency.ATTENTION
     elif picture.status is Status.PAUSING:
         word, urgency = "PAUSING", Urgency.ATTENTION
     elif picture.status is Status.FAULTED:
         word, action, urgency = "STOPPED", "Nothing to do: the robot is stopped", Urgency.ALARM
     return Banner(word, action, f"Next: {_following(picture, settings)}", rest, urgency)
+
+
+def _recorded(picture: RunPicture) -> str:
+    if isinstance(picture.setback, events.Interrupted):
+        return f"It ended early: {picture.setback.reason}"
+    return picture.state.ended.line if picture.state.ended is not None else _doing(picture)
 
 
 def _ended(picture: RunPicture) -> Banner:
@@ -79,16 +86,17 @@ def _ended(picture: RunPicture) -> Banner:
         following = teach or "4 Review shows the result, 5 History all runs."
         return Banner(word, line, following, "Nothing moves.", verdict_urgency(verdict))
     if why := picture.why_not_written:
-        following = "Press 5: w there writes its proposal after all; 2 and r ask again."
+        following = "Press 5: w there writes it after all; 2 and r ask again."
         return Banner("NOT WRITTEN", _capital(why), following, "", Urgency.ATTENTION)
-    reason, is_lost = "its process is gone without a word; the robot may still move", False
+    reason, action = "its process is gone without a word; the robot may still move", RESUMING
     if isinstance(picture.setback, events.Interrupted):
         reason = picture.setback.reason
     elif isinstance(picture.setback, HostFailed):
-        reason, is_lost = picture.setback.problem, picture.setback.evidence_lost
-    action = (
-        "Press 2, then s begins a new run" if is_lost else "Press 2, then r resumes it: nothing is lost"
-    )
+        reason = picture.setback.problem
+        if picture.setback.exit_code == ExitCode.USAGE:  # as it is, it cannot be resumed
+            action = picture.setback.action or RESUMING
+        elif picture.setback.evidence_lost:
+            action = "Press 2, then s begins a new run"
     return Banner("ENDED EARLY", action, _capital(reason), "", Urgency.ALARM)
 
 
@@ -102,9 +110,18 @@ def _asked(picture: RunPicture, rest: str) -> Banner:
     return Banner(word, action, "".join(view.paragraphs[:1]), rest, view.urgency)
 
 
+def _word(picture: RunPicture) -> str:
+    step = picture.step
+    if isinstance(step, Move):
+        return "ROBOT MOVES"
+    if step is None and not picture.state.sets:
+        return "STARTING"
+    return "COMPUTING" if step is not None and step.moves_nothing else "MEASURING"
+
+
 def _doing(picture: RunPicture) -> str:
     if (step := picture.step) is None:
-        return "choosing the next pose"
+        return "choosing the next pose" if picture.state.sets else "devices and controller are made ready"
     if isinstance(step, Move):
         name = step.at.name
         named = {0: f"a waypoint on the way to {name}", 1: f"the reference of {name}"}
@@ -115,10 +132,11 @@ def _doing(picture: RunPicture) -> str:
 
 def _following(picture: RunPicture, settings: CellSettings | None) -> str:
     at, step = picture.at, picture.step
-    if picture.state.ended is not None:
+    if picture.state.ended is not None or isinstance(picture.setback, events.Interrupted):
         return "4 Review shows the result"
     if at is None or (step is not None and step.moves_nothing):
-        return AFTER_COMPUTING.get("" if step is None else step.kind, "the next pose")
+        otherwise = "the next pose" if picture.state.sets else "the robot goes to the first point"
+        return AFTER_COMPUTING.get("" if step is None else step.kind, otherwise)
     if isinstance(step, Place):
         return "the reference is read, then the gauges are tried by small moves"
     return _after_set(picture.state, at, settings)
@@ -140,11 +158,11 @@ def _after_set(state: RunState, at: SetKey, settings: CellSettings | None) -> st
     return "identifying the geometry" if is_identifying else "the next part of the run"
 
 
-def _watching(picture: RunPicture) -> str:
+def _stopping(picture: RunPicture) -> str:
     control = picture.control
-    if control is None or control.is_in_control:
-        return ""
-    return f"You only watch: {control.who or 'nobody'} is in control; c takes over"
+    if control is not None and not control.is_in_control:
+        return "You only watch; c takes over"
+    return "a ends it" if picture.status is Status.PAUSED else "p pauses, a ends it"
 
 
 def cell_banner(live: LiveSnapshot | None, problem: str) -> Banner:

@@ -17,8 +17,6 @@ WIDE_BAR = 33
 OLD_S = 2.0
 """Silence of a device from which it is shown, s."""
 
-NOT_CONNECTED = "No device is connected."
-
 
 def cell_facts(cell: Cell) -> Iterator[str]:
     """A line each: what there is, what is measured, and what must be reached."""
@@ -65,7 +63,7 @@ def _gauge_card(gauge: GaugeSnapshot, later_s: float) -> Card:
     place, half = plunger_place(gauge), gauge.travel_mm / 2.0
     stands = "mid travel not known" if place is None else f"{place:+.2f} of ±{half:g} mm travel"
     noise = "noise not known yet" if gauge.noise_mm is None else f"noise {1e3 * gauge.noise_mm:.1f} um"
-    lines = (travel_bar(place, half), stands, f"{noise}, {age} ago")
+    lines = (travel_bar(place, half), stands, f"{noise}, {age}")
     return Card(title, "ok", Urgency.GOOD, f"{gauge.shown_mm:+.4f} {gauge.unit}", lines)
 
 
@@ -82,7 +80,7 @@ def _encoder_card(encoders: Shown[EncoderSample], later_s: float) -> Card:
         return _without_value("encoders", "NO READING", encoders.problem, age)
     numbered = [f"{number} {position:+9.3f}" for number, position in enumerate(sample.positions, start=1)]
     lines = [f"{left}   {right}" for left, right in zip(numbered[:3], numbered[3:], strict=True)]
-    return Card("encoders", "ok", Urgency.GOOD, f"six positions, {sample.unit}", (*lines, f"{age} ago"))
+    return Card("encoders", "ok", Urgency.GOOD, f"six positions, {sample.unit}", (*lines, age))
 
 
 def _controller_card(controller: Shown[ControllerStatus], later_s: float) -> Card:
@@ -91,9 +89,9 @@ def _controller_card(controller: Shown[ControllerStatus], later_s: float) -> Car
         return _without_value("controller", "NO ANSWER", controller.problem, age)
     said = tuple(status.error_messages)
     if status.estop:
-        return Card("controller", "EMERGENCY STOP", Urgency.ALARM, "stopped", (*said, f"{age} ago"))
+        return Card("controller", "EMERGENCY STOP", Urgency.ALARM, "emergency stop", (*said, age))
     figure, urgency = ("on, may move", Urgency.GOOD) if status.enabled else ("off", Urgency.ATTENTION)
-    return Card("controller", "ok" if status.enabled else "off", urgency, figure, (*said, f"{age} ago"))
+    return Card("controller", "ok" if status.enabled else "off", urgency, figure, (*said, age))
 
 
 def gauge_lines(
@@ -107,7 +105,7 @@ def gauge_lines(
         zero_mm: what the gauges showed along base x, y, z when they were zeroed.
     """
     if live is None:
-        return [(NOT_CONNECTED, Urgency.CALM)]
+        return [("Nothing is read now.", Urgency.CALM)]
     lines = [(_gauge_line(one, later_s, zero_mm), urgency_of(one.problem)) for one in live.gauges]
     encoders, controller = _encoder_card(live.encoders, later_s), _controller_card(live.controller, later_s)
     others = [
@@ -131,14 +129,14 @@ def _gauge_line(gauge: GaugeSnapshot, later_s: float, zero_mm: ThreeNumbers | No
     name = gauge.name if gauge.name == gauge.axis else f"{gauge.name} ({gauge.axis})"
     age = age_text(gauge.age_s, later_s)
     if gauge.problem:
-        since = "" if gauge.age_s is None else f" for {age}"
+        since = "" if gauge.age_s is None else f", last answer {age}"
         return f"{name:3}NO READING{since}: {gauge.problem.removeprefix(f'gauge {gauge.name}: ')}"
     place, half = plunger_place(gauge), gauge.travel_mm / 2.0
     moved = gauge_deviation(gauge, zero_mm)
     reading = "-" if gauge.shown_mm is None else f"{gauge.shown_mm:+.4f}"
     deviation = f"{'':14}" if moved is None else f"{moved:+9.3f} mm  "
     stands = "" if place is None else f"  reads {reading} {gauge.unit}"
-    old = f", {age} old" if gauge.age_s is None or gauge.age_s + later_s > OLD_S else ""
+    old = "" if gauge.age_s is None or gauge.age_s + later_s <= OLD_S else f", {age}"
     return f"{name:3}{deviation}{travel_bar(place, half)}{stands}{old}"
 
 
@@ -186,7 +184,7 @@ def age_text(age_s: float | None, later_s: float) -> str:
     if age_s is None:
         return "never"
     age = age_s + later_s
-    return f"{age:.1f} s" if age < 99.95 else "> 99 s"
+    return f"{age:.1f} s ago" if age < 99.95 else "> 99 s ago"
 
 
 def large_figures(

@@ -9,17 +9,17 @@ QUESTIONS = {
     "name": ("What is this cell called?", "A short name, as it is to stand on screens and in reports."),
     "config": (
         "In which file does the controller keep its geometry?",
-        "Relative to the cell file. It must hold the drawing's numbers: S, B, l and branch in [geometry].",
+        "Relative to the cell file. Its [geometry] has the drawing's numbers, and tells the mechanism.",
     ),
     "tolerance": (
         "How far may a joint or a leg's length be from the drawing, mm?",
-        "What the builder promises, to either side. Better too much than too little.",
+        "What the builder promises, to either side. Better too much than too little; angles apart.",
     ),
     "host": ("What is the controller's network name or address?", "127.0.0.1 if it is this computer."),
     "port": ("On which TCP port does it listen?", "linuxcncrsh listens on 5007."),
-    "sliders": (
-        "From where to where may the sliders go, mm?",
-        "Two numbers: the smallest and the largest position of any slider.",
+    "joints": (
+        "From where to where may the {joint}s go, {unit}?",
+        "Two numbers: the smallest and the largest position of any {joint}.",
     ),
     "protocol": (
         "What does the {axis} gauge speak?",
@@ -60,15 +60,18 @@ class FirstCellAssistant:
 
     @property
     def progress(self) -> str:
-        """Which of how many questions is asked now."""
-        return f"Question {self._number + 1} of {len(self._draft.answers())}"
+        """Which of how many questions is asked now, and about which machine."""
+        of = f"{len(self._draft.answers())}, {self._draft.mechanism.words.machine}"
+        return f"Question {self._number + 1} of {of}"
 
     @property
     def question(self) -> tuple[str, str]:
         """What is asked now, and a hint."""
         kind, _, axis = self._draft.answers()[self._number].name.partition(" ")
         text, hint = QUESTIONS["port of gauge" if kind == "port" and axis else kind]
-        return text.format(axis=axis), hint.format(axis=axis)
+        words = self._draft.mechanism.words
+        known = {"axis": axis, "joint": words.joint, "unit": words.joint_unit}
+        return text.format(**known), hint.format(**known)
 
     @property
     def suggestion(self) -> str:

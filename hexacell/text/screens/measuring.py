@@ -16,7 +16,7 @@ from procedures.calibration.calibration import Mode
 from procedures.run.keys import Phase
 from procedures.steps import events
 
-RESUMABLE = "What was measured is kept. Mend it, then press r in 2 Preflight, which resumes the run."
+RESUMABLE = "What was measured is kept. Mend what is to be mended, then r in 2 Preflight resumes the run."
 
 PACE_RECORDS = 8
 """Number of the latest records whose pace counts."""
@@ -25,7 +25,7 @@ SUSPICIOUS_SIGMAS = 4.0
 """From so many standard deviations on a record is marked."""
 
 PHASES = {
-    Phase.IDENTIFY: "calibrating",
+    Phase.IDENTIFY: "measuring",
     Phase.BEFORE: "held-out poses, old geometry",
     Phase.AFTER: "held-out poses, new geometry",
     Phase.CONFIRM: "confirming records",
@@ -80,10 +80,11 @@ def remaining(picture: RunPicture, settings: CellSettings | None) -> str:
     done, planned = readings(picture)
     if planned <= 0:
         return f"{done} readings so far" if done else ""
-    left = max(0, planned - done)
+    if (left := planned - done) <= 0:
+        return ""
     minutes = _minutes(picture, settings, left)
-    about = "" if minutes is None else f"About {duration(minutes)} left: "
-    return f"{about}at most {left} of {planned} readings"
+    about = "" if minutes is None else f"About {duration(minutes)}, "
+    return f"{about}at most {left} readings left"
 
 
 def readings(picture: RunPicture) -> tuple[int, int]:

@@ -51,7 +51,7 @@ def question_view(
                 for number, choice in enumerate(question.choices, start=1)
             )
             return QuestionView(
-                title="The robot stands still: this went wrong",
+                title="Something went wrong, and the robot stands still",
                 paragraphs=(problem,),
                 instruction="Mend it, then press a number:",
                 choices=tuple(choices),
@@ -60,7 +60,8 @@ def question_view(
             )
         case questions.UnreadyController(problem=problem, request=request):
             title, asked = "The controller is not ready", (f"{problem}.", request)
-            return yes_or_no(title, asked, ("yes", questions.YES), ("no", questions.NO))
+            no = "no, end the run; it can be resumed", questions.NO
+            return yes_or_no(title, asked, ("yes", questions.YES), no)
 
 
 def _placement(place: questions.GaugePlacement, live: LiveSnapshot | None) -> QuestionView:
@@ -115,14 +116,14 @@ def yes_or_no(
 
 ABORTING = yes_or_no(
     "End this run?",
-    ("The robot stops after its step. What was measured is kept: r in 2 Preflight resumes it.",),
+    ("The robot stops in place. What was measured is kept: r in 2 Preflight resumes the run.",),
     ("yes, end it", questions.YES),
     ("no, go on", None),
 )
 
 AGAIN_FOLLOWS = (
-    "The robot goes back to the reference of its point. Where that shows something else by now, because "
-    "the gauges have been moved, the whole point is measured again."
+    "The robot goes back to the reference of its point. Where that shows something else by now, as the "
+    "gauges have been moved, the whole point is measured again, and the present one after it."
 )
 
 

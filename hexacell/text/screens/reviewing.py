@@ -23,14 +23,14 @@ PROPOSAL_WAITS = "Its proposal can still be written: w asks for it, with the cha
 
 PARAMETER_COLUMNS = (
     Column("parameter", 13),
-    *(Column(name, 12, is_figure=True) for name in ("config now", "new config", "changed by")),
-    Column("sigma", 9, is_figure=True),
+    *(Column(name, 11, is_figure=True) for name in ("config now", "new config", "changed by")),
+    Column("sigma", 7, is_figure=True),
     Column("  meaning", 24),
 )
 
 FRAMES = (
     "The config's numbers are in the frames that move your taught points least. What changed, and its "
-    "sigma, are in the frames {frame}, where a choice of frames is no change."
+    "sigma, are in others ({frame}), where a choice of frames is no change."
 )
 
 

@@ -114,10 +114,11 @@ def _with_event(picture: RunPicture, message: messages.EventRecorded) -> RunPict
             if not isinstance(step, Move) or (expected := step.expected) is None:
                 return picture
             records, forecast = len(picture.state.samples(Phase.IDENTIFY)), expected.forecast
+            earlier = tuple(one for one in picture.forecasts if one[0] < records)  # others were discarded
             return replace(
                 picture,
                 expected={**picture.expected, (step.at, step.orientation): expected},
-                forecasts=(*picture.forecasts, *([] if forecast is None else [(records, forecast)])),
+                forecasts=(*earlier, *([] if forecast is None else [(records, forecast)])),
             )
         case events.RecordTaken():
             return replace(picture, record_times=(*picture.record_times, message.at), step=None)
@@ -146,7 +147,9 @@ def header_line(cell: str, picture: RunPicture) -> tuple[str, str]:
         speed = f"x{cursor.speed:g}" if cursor.speed else "halted"
         return where, f"{cursor.at:%Y-%m-%d %H:%M:%S} {cursor.sequence}/{cursor.last} {speed}"
     who = ""
-    if control is not None:
+    if picture.status is Status.ENDED:
+        who = "over"
+    elif control is not None:
         watching = f"watching, {control.who or 'nobody'} is in control"
         who = "you are in control" if control.is_in_control else watching
     return f"hexacell │ {cell} │ {activity}", who

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from drivers.interfaces import EncoderSample
 from hexacell.campaign.budget import TimeModel
+from hexacell.campaign.decisions import Forecast
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.cell.recovery import Action, FailureKind
@@ -23,15 +24,17 @@ from hexacell.run_process.messages import (
     QuestionChanged,
     RunDescribed,
     Shown,
+    StatusChanged,
 )
 from hexacell.text.screens.banner import cell_banner, preflight_banner, run_banner
-from hexacell.text.screens.devices import device_cards
+from hexacell.text.screens.devices import device_cards, gauge_lines
 from hexacell.text.screens.measuring import fault_view, record_rows, remaining
 from hexacell.text.screens.placing import mounting_advice, placing
 from hexacell.text.screens.reviewing import review_lines
-from hexacell.text.screens.run_picture import RunPicture, Setback, picture_after
+from hexacell.text.screens.run_picture import RunPicture, Setback, header_line, picture_after
 from hexacell.text.screens.views import ChecklistItem, Mark, Urgency
 from hexacell.verdict.decision import Verdict
+from procedures.engine.command_loop import Status
 from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import ask_placement
 from procedures.run.trips import Guard
@@ -118,7 +121,7 @@ def test_the_time_that_is_left_follows_from_the_pace_and_from_people() -> None:
     story = Story(POINT)
     told = [recorded(story.sampled(number), number) for number in range(1, 6)]
     picture = pictured(described(expected_records=25), *told)
-    assert remaining(picture, None) == "About 10 minutes left: at most 20 of 25 readings"
+    assert remaining(picture, None) == "About 10 minutes, at most 20 readings left"
     bundled = load_cell(bundled_config("simulated-hexaglide")).settings
     stations = bundled.stations.model_copy(update={"placement": "by-hand"})
     settings = bundled.model_copy(update={"stations": stations})
@@ -126,12 +129,19 @@ def test_the_time_that_is_left_follows_from_the_pace_and_from_people() -> None:
     visits = len(settings.identification.points) + 2 * len(settings.verification.points)
     assert by_hand > 0.0
     minutes = round(10.0 + (visits - 1) * by_hand)
-    assert remaining(picture, settings) == f"About {minutes} minutes left: at most 20 of 25 readings"
+    assert remaining(picture, settings) == f"About {minutes} minutes, at most 20 readings left"
 
 
 def test_who_watches_is_told_who_is_in_control() -> None:
     picture = pictured(described(), ControlChanged(is_in_control=False, who="grace"))
-    assert run_banner(picture, None).rest == "You only watch: grace is in control; c takes over"
+    assert run_banner(picture, None).rest == "You only watch; c takes over"
+    assert header_line("c", picture)[1] == "watching, grace is in control"
+    paused = picture_after(picture, StatusChanged(status=Status.PAUSED), 0.0)
+    assert (
+        run_banner(paused, None).action == "Press c to take over, then p to go on; the robot stands still"
+    )
+    ended = picture_after(picture, StatusChanged(status=Status.ENDED), 0.0)
+    assert header_line("c", ended)[1] == "over"
     asked = picture_after(
         picture,
         QuestionChanged(question=ask_placement(SetKey(phase=Phase.LENGTH, point=1), Pose(0.0, 0.0, 0.0))),
@@ -139,6 +149,45 @@ def test_who_watches_is_told_who_is_in_control() -> None:
     )
     banner = run_banner(asked, None)
     assert (banner.word, banner.urgency) == ("WAITING", Urgency.CALM)
+
+
+def test_a_run_that_cannot_be_resumed_says_so_and_one_that_begins_says_what_comes() -> None:
+    banner = run_banner(pictured(described()), None)
+    assert "choosing" not in banner.action
+    assert banner.following == "Next: the robot goes to the first point"
+    refused = HostFailed(problem="c.toml has changed", action="Undo the change", exit_code=2)
+    picture = pictured(described(), refused, StatusChanged(status=Status.ENDED))
+    assert run_banner(picture, None).action == "Undo the change"
+
+
+def test_a_recorded_run_that_ended_early_says_why() -> None:
+    early = recorded(events.Interrupted(reason="it was declined", exit_code=1))
+    banner = run_banner(pictured(described(is_recorded=True), early), None)
+    assert banner.action == "It ended early: it was declined"
+    assert "next" not in banner.following
+
+
+def test_forecasts_with_records_that_were_discarded_are_not_drawn() -> None:
+    story, forecast = Story(POINT), Forecast(now_mm=1.0, next_mm=0.9, end_mm=0.1, records=9, minutes=1.0)
+    expected = Expectation(
+        deviation_mm=(0.0, 0.0, 0.0), sigma_mm=(1.0, 1.0, 1.0), gain=1.0, forecast=forecast
+    )
+    moves = [
+        recorded(events.StepBegun(step=Move(at=POINT, orientation=2, pose=(0.0,) * 6, expected=expected)))
+    ]
+    told = [recorded(story.sampled(number)) for number in range(1, 6)]
+    picture = pictured(described(), *told[:2], *moves, *told[2:], *moves)
+    assert [records for records, _ in picture.forecasts] == [2, 5]
+    again = [recorded(events.SetInvalidated(at=POINT, reason="so")), *told[:3], *moves]
+    for message in again:
+        picture = picture_after(picture, message, 0.0)
+    assert [records for records, _ in picture.forecasts] == [2, 3]
+
+
+def test_a_gauge_without_a_reading_is_not_old() -> None:
+    lines = gauge_lines(LiveSnapshot(gauges=(gauge(shown_mm=None, age_s=None), gauge(age_s=7.5))))
+    assert "never" not in lines[0][0]
+    assert lines[1][0].endswith(", 7.5 s ago")
 
 
 def test_a_question_is_a_persons_turn_with_the_key_that_shows_it() -> None:

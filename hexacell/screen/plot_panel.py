@@ -42,7 +42,7 @@ class PlotPanel(Vertical):
 
     def __init__(self, *, id: str | None = None, classes: str = "") -> None:  # noqa: A002 - as in every widget
         super().__init__(id=id, classes=f"panel {classes}")
-        self._view: PlotView | None = None
+        self._shown: tuple[PlotView, str] | None = None
         self._across = (0.0, 1.0)
 
     def on_resize(self) -> None:
@@ -61,9 +61,9 @@ class PlotPanel(Vertical):
         """Show a view."""
         plot: PlotWidget = self.query_one(".plot")  # type: ignore[assignment]  # see compose
         # As it is mounted it forgets what it was given before.
-        if view == self._view or not plot.is_mounted:
+        if (shown := (view, self.app.theme)) == self._shown or not plot.is_mounted:
             return
-        self._view = view
+        self._shown = shown
         self.border_title = view.title
         self.border_subtitle = "" if view.is_empty else f"{view.legend}   → {view.x_label}"
         note = self.query_one(".plot-note", TextPanel)

@@ -18,11 +18,12 @@ class RobotPanel(Static):
     """A scene, drawn again when its size changes."""
 
     _scene: Scene | None = None
+    _theme = ""
 
     def show(self, scene: Scene | None) -> None:
         """Show a scene; nothing for None."""
-        if scene is not self._scene:
-            self._scene = scene
+        if scene is not self._scene or self._theme != self.app.theme:
+            self._scene, self._theme = scene, self.app.theme
             self.on_resize()
 
     def on_resize(self) -> None:

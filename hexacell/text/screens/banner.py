@@ -75,15 +75,15 @@ def _recorded(picture: RunPicture) -> str:
 def _ended(picture: RunPicture) -> Banner:
     if (ended := picture.state.ended) is not None:
         verdict, judged = picture.state.verdict, picture.state.judged
-        word = "DONE" if verdict is None else verdict.upper()
-        line = ended.line
+        word, line = "DONE" if verdict is None else verdict.upper(), ended.line
         found = None if judged is None else judged.verification or judged.check
         if found is not None and (accuracy := found.accuracy) is not None:
             error = error_with_u(accuracy).replace("+-", "±")
             line = f"Position error {error} mm at the task poses, limit {accuracy.position.limit:g} mm"
-        kept = picture.state.proposed if picture.state.committed and not picture.state.rolled_back else None
-        teach = "" if kept is None or kept.displacement is None else f"{teaching_line(kept.displacement)}."
-        following = teach or "4 Review shows the result, 5 History all runs."
+        key = "2 and s calibrate" if verdict is Verdict.FAIL else "5 History all runs"
+        is_kept = picture.state.committed is not None and not picture.state.rolled_back
+        moved = picture.state.proposed.displacement if is_kept and picture.state.proposed else None
+        following = f"4 Review shows the result, {key}." if moved is None else f"{teaching_line(moved)}."
         return Banner(word, line, following, "Nothing moves.", verdict_urgency(verdict))
     if why := picture.why_not_written:
         following = "Press 5: w there writes it after all; 2 and r ask again."

@@ -78,10 +78,8 @@ def progress(picture: RunPicture, settings: CellSettings | None) -> Progress:
 def remaining(picture: RunPicture, settings: CellSettings | None) -> str:
     """How long the run still takes, and how many readings that is at most; empty if nothing is known."""
     done, planned = readings(picture)
-    if planned <= 0:
-        return f"{done} readings so far" if done else ""
     if (left := planned - done) <= 0:
-        return ""
+        return f"{done} readings so far" if done and planned <= 0 else ""
     minutes = _minutes(picture, settings, left)
     about = "" if minutes is None else f"About {duration(minutes)}, "
     return f"{about}at most {left} readings left"

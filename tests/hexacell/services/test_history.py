@@ -58,7 +58,10 @@ def test_a_run_that_is_not_over_says_so(cell) -> None:
     record(run.folder.journal, (*history[:-1], events.Interrupted(reason="a cable broke", exit_code=3)))
     (found,) = past_runs(cell)
     assert not found.summary.is_over
-    assert (found.summary.line, standing(found)) == ("not over: a cable broke", "not over")
+    assert (found.summary.line, standing(found)) == ("not over: a cable broke", "proposal")
+    run.folder.proposal.unlink()
+    (found,) = past_runs(cell)
+    assert standing(found) == "not over"
 
 
 def test_what_cannot_be_read_is_listed_last_with_its_reason(cell) -> None:

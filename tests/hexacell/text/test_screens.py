@@ -160,6 +160,14 @@ def test_a_run_that_cannot_be_resumed_says_so_and_one_that_begins_says_what_come
     assert run_banner(picture, None).action == "Undo the change"
 
 
+def test_after_a_fail_the_key_of_a_calibration_is_named() -> None:
+    for verdict, key in ((Verdict.FAIL, "2 and s calibrate"), (Verdict.PASS, "5 History")):
+        judged = events.ResultValidated(verdict=verdict, line="so")
+        told = recorded(judged), recorded(events.Ended(exit_code=0, line="so"), 2)
+        banner = run_banner(pictured(described(), *told, StatusChanged(status=Status.ENDED)), None)
+        assert key in banner.following
+
+
 def test_a_recorded_run_that_ended_early_says_why() -> None:
     early = recorded(events.Interrupted(reason="it was declined", exit_code=1))
     banner = run_banner(pictured(described(is_recorded=True), early), None)

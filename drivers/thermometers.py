@@ -50,11 +50,7 @@ class SysfsThermometer:
         return DeviceIdentity(self._subject, "sysfs", str(self._path))
 
     async def read(self) -> TemperatureReading:
-        """The temperature now, deg C.
-
-        Raises:
-            DeviceError: the file gives none, or not in time.
-        """
+        """The temperature now, deg C. Raises ``DeviceError``: the file gives none, or not in time."""
         if self._reading is not None and not self._reading.done():
             raise self._error("still does not answer", SLOW)
         self._thread = self._thread or ThreadPoolExecutor(1, thread_name_prefix="thermometer")

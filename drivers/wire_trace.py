@@ -139,10 +139,8 @@ def read_trace(text: str) -> tuple[TraceEntry, ...]:
         if line.startswith("#"):
             continue
         if (match := ENTRY.fullmatch(line)) is None:
-            raise FileError(
-                f"line {number} is no entry of a wire trace: {line[:60]!r}",
-                action="Take it from a run's `wire`",
-            )
+            problem = f"line {number} is no entry of a wire trace: {line[:60]!r}"
+            raise FileError(problem, action="Take it from a run's `wire`")
         data = bytes.fromhex(match["bytes"])
         entries.append(
             TraceEntry(float(match["time_s"]), match["line"], TrafficDirection(match["direction"]), data)

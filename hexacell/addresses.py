@@ -61,10 +61,8 @@ def require_serial_port(port: str) -> None:
     if not mark or scheme in WITHOUT_HOST:
         return
     if scheme not in SERIAL_SCHEMES:
-        raise UsageError(
-            f"serial ports of {scheme}:// are refused",
-            action="Write a device path, socket://HOST:PORT or rfc2217://HOST:PORT",
-        )
+        problem = f"serial ports of {scheme}:// are refused"
+        raise UsageError(problem, action="Write a device path, socket://HOST:PORT or rfc2217://HOST:PORT")
     address = address_of(port)
     if not address.hostname or address.port is None:
         raise _mistaken("it has no host and port")

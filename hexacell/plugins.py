@@ -140,10 +140,8 @@ def _only(group: Group, name: str) -> EntryPoint:
         raise UsageError(f"there is no {group.noun} '{name}'", action=action)
     found = list(by_target.values())
     if len(found) > 1:
-        raise UsageError(
-            f"{group.noun} '{name}' is defined more than once, by {_packages(found)}",
-            action="Uninstall all but one",
-        )
+        problem = f"{group.noun} '{name}' is defined more than once, by {_packages(found)}"
+        raise UsageError(problem, action="Uninstall all but one")
     return found[0]
 
 

@@ -110,10 +110,8 @@ def _signal(
         _named(message.signals, needed, "signal", settings)
     scales = SCALES[unit]
     if signal.unit not in scales:
-        raise refused(
-            f"signal {name} is in {signal.unit or 'no unit'}, where joints are in {unit}",
-            action=f"Give it one of the units {', '.join(scales)}",
-        )
+        problem = f"signal {name} is in {signal.unit or 'no unit'}, where joints are in {unit}"
+        raise refused(problem, action=f"Give it one of the units {', '.join(scales)}")
     scale = scales[signal.unit]
     if not signal.is_float and step > COARSER * abs(signal.scale * scale):
         raise refused(
@@ -154,10 +152,8 @@ class DbcSession(BankSession):
     ) -> None:
         described = settings.dbc
         if described is None:
-            raise UsageError(
-                "the encoders' messages are not stated",
-                action="Add [encoders.dbc] with file and signals to the cell file",
-            )
+            problem = "the encoders' messages are not stated"
+            raise UsageError(problem, action="Add [encoders.dbc] with file and signals to the cell file")
         self._described = described
         self._signals = read_signals(described, settings.unit, settings.step)
         self._frames = {signal.frame for signal in self._signals}

@@ -89,11 +89,8 @@ class ModbusSession(BankSession):
             )
         self._described, self._closing = described, closing
         if described.port is None:
-            raise BusError(
-                "have no port in the cell file",
-                subject="encoders",
-                action="State `port` under [encoders.modbus]",
-            )
+            problem = "have no port in the cell file"
+            raise BusError(problem, subject="encoders", action="State `port` under [encoders.modbus]")
         self._url = described.port
         line = {**LINE, **described.serial, "settle_s": described.settle_s}
         self._port = ModbusPort(self._url, line, closing, trace)

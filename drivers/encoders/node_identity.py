@@ -251,12 +251,9 @@ def _default(lines: _Lines, entry: ObjectEntry, path: Path) -> int | None:
         return None
     text, line = lines[place]
     if (number := _number(text)) is None:
-        raise FileError(
-            f"has {text!r} in section [{place[0]}], where a number is needed",
-            subject=path,
-            line=line,
-            action="Write DefaultValue= (or the key that is there) and the number, 0x1A if in hexadecimal",
-        )
+        problem = f"has {text!r} in section [{place[0]}], where a number is needed"
+        action = "Write DefaultValue= (or the key that is there) and the number, 0x1A if in hexadecimal"
+        raise FileError(problem, subject=path, line=line, action=action)
     return number % (1 << 8 * entry.size)
 
 

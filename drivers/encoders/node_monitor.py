@@ -197,11 +197,7 @@ class AlarmPoll:
         self._begun_s = time.monotonic()
 
     def check(self) -> None:
-        """Read the alarm entries if they are due.
-
-        Raises:
-            InvalidSampleError: there is an alarm.
-        """
+        """Read the alarm entries if they are due. Raises ``InvalidSampleError``: there is an alarm."""
         now_s = time.monotonic()
         self._sampling_s += now_s - self._begun_s
         emergencies = sum([monitor.emergencies for monitor in self.monitors])

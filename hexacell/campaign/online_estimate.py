@@ -74,11 +74,7 @@ class OnlineEstimate:
         return estimate_online(problem.starting_at(found.free, poses))
 
     def gauge_zero(self, point: int) -> GaugeZero:
-        """Where a point's gauges were zeroed.
-
-        Raises:
-            LimitError: there are no records of the point.
-        """
+        """Where a point's gauges were zeroed. Raises ``LimitError``: there are no records of the point."""
         found = self.identification
         if found is None or point not in found.problem.labels[:, 0]:
             raise LimitError("the records of this point do not determine the ball's position")

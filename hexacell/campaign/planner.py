@@ -62,11 +62,7 @@ class Plan:
     most_turned: float = np.pi
 
     def decide(self, state: decisions.CampaignState) -> decisions.Decision:
-        """What to do now.
-
-        Raises:
-            HexacellError: no geometry fits the records.
-        """
+        """What to do now. Raises ``HexacellError``: no geometry fits the records."""
         if state.point is None:
             return self._between_points(state)
         if not state.records_at(state.point):

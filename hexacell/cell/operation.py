@@ -275,10 +275,8 @@ class NotificationSettings(Section):
 def require_sendable(url: str) -> None:
     """Refuse an address, wherever it is from, by which no notices are sent; raises ``UsageError``."""
     if scheme_of(url) not in TOLD_BY:
-        raise UsageError(
-            "notices are not sent by this kind of address",
-            action="Write one that docs/howto-integrations.md names",
-        )
+        problem = "notices are not sent by this kind of address"
+        raise UsageError(problem, action="Write one that docs/howto-integrations.md names")
     hosts_of(url)
 
 

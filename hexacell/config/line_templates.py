@@ -82,10 +82,8 @@ def _templates(parameters: ParameterSet, lines: Iterable[str]) -> Iterator[_Line
     for line in lines:
         fields = {field for _, field in _parsed(line) if field is not None}
         if unknown := sorted(fields - of_a_leg - {*parameters.names}):
-            raise UsageError(
-                f"config_options: {line!r} has {{{unknown[0]}}}, which is no parameter",
-                action=f"A leg has {', '.join(sorted(of_a_leg))}",
-            )
+            problem = f"config_options: {line!r} has {{{unknown[0]}}}, which is no parameter"
+            raise UsageError(problem, action=f"A leg has {', '.join(sorted(of_a_leg))}")
         for leg in range(1, LEGS + 1) if fields & of_a_leg else (1,):
             yield _template(line, leg, of_a_leg)
 
@@ -142,12 +140,9 @@ def _tokens(
             action="Correct the config, or lines in [controller.config_options]",
         )
     if len(found) > 1:
-        raise FileError(
-            f"a second line, after line {found[0][0]}, is like {template.shown}",
-            subject=source,
-            line=found[1][0],
-            action="Make the template differ from it",
-        )
+        problem = f"a second line, after line {found[0][0]}, is like {template.shown}"
+        action = "Make the template differ from it"
+        raise FileError(problem, subject=source, line=found[1][0], action=action)
     line, start, match = found[0]
     return {
         name: NumberToken(match[group], start + match.start(group), start + match.end(group), line)

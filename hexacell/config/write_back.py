@@ -61,11 +61,8 @@ def rollback(receipt: Receipt) -> None:
         return
     if fingerprint_of(found) != receipt.sha256_after:
         path, copy = _edited(receipt, found, before)
-        raise FileError(
-            "the config was changed since it was written; rolling back would lose that change",
-            subject=path,
-            action=f"Review it; if it may be lost, copy {copy} over it",
-        )
+        problem = "the config was changed since it was written; rolling back would lose that change"
+        raise FileError(problem, subject=path, action=f"Review it; if it may be lost, copy {copy} over it")
     restore(receipt.paths, before, expected=found)
 
 
@@ -113,11 +110,8 @@ def _back_up(receipt: Receipt, before: Contents, after: Contents) -> None:
     atomic_files.create_folder_durably(folder)
     for path, data in zip(receipt.kept(BEFORE), before, strict=True):
         if atomic_files.read_if_present(path) not in {None, data}:
-            raise FileError(
-                "this folder already holds the backup of another version",
-                subject=path,
-                action="Use another folder for each write-back",
-            )
+            problem = "this folder already holds the backup of another version"
+            raise FileError(problem, subject=path, action="Use another folder for each write-back")
     for name, contents in ((BEFORE, before), (AFTER, after)):
         for path, data, like in zip(receipt.kept(name), contents, receipt.paths, strict=True):
             atomic_files.write_own(path, data, like=like)

@@ -152,7 +152,5 @@ def _trend(parameters: ParameterSet, row: int, days: Array, values: Array, sigma
 
 def _require_same_frame(results: Sequence[IdentificationResult]) -> None:
     if len({result.frame for result in results}) > 1:
-        raise UsageError(
-            "these runs have different frame conventions: their numbers cannot be compared",
-            action="Compare runs of one mechanism",
-        )
+        problem = "these runs have different frame conventions: their numbers cannot be compared"
+        raise UsageError(problem, action="Compare runs of one mechanism")

@@ -40,12 +40,8 @@ def require_frames(mechanism: Mechanism, geometry: Geometry, path: Path, line: i
     try:
         mechanism.normalize_frames(geometry)
     except UsageError as error:
-        raise FileError(
-            f"the geometry is no robot's: {error.problem}",
-            subject=path,
-            line=line,
-            action="Correct its joints",
-        ) from error
+        problem = f"the geometry is no robot's: {error.problem}"
+        raise FileError(problem, subject=path, line=line, action="Correct its joints") from error
 
 
 def require_same_robot(cell: Cell, drawing: Geometry, controller: Geometry) -> None:

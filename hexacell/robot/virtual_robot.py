@@ -129,11 +129,7 @@ class VirtualRobot:
         self._zero = None
 
     def measure(self, point: int, orientation: int) -> Record:
-        """The record of the present pose, with noise.
-
-        Raises:
-            LimitError: it is not at any pose yet.
-        """
+        """The record of the present pose, with noise. Raises ``LimitError``: it is not at any pose yet."""
         model = self.model
         shown = model.frames.base.T @ self._actual_pose.positions[0]
         shown = shown + model.noise.gauges_mm * self.random.standard_normal(3)

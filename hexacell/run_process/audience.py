@@ -199,10 +199,8 @@ class Audience:
         match messages.client_message(line):
             case messages.GiveCommand(command=command):
                 if client is not self._in_control:
-                    raise UsageError(
-                        f"{type(command).__name__}: {self._who or 'nobody'} is in control of this run",
-                        action="Take control first",
-                    )
+                    problem = f"{type(command).__name__}: {self._who or 'nobody'} is in control of this run"
+                    raise UsageError(problem, action="Take control first")
                 self._on_command(command)
             case messages.TakeControl():
                 self._give_control(client)

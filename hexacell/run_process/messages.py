@@ -225,7 +225,5 @@ def _read(known: TypeAdapter[Message], line: bytes) -> Message:
     try:
         return known.validate_json(line)
     except ValidationError as error:
-        raise UsageError(
-            f"this message is not understood ({first_mistake(error, 'the message')})",
-            action="Use the same version of hexacell on both sides",
-        ) from error
+        problem = f"this message is not understood ({first_mistake(error, 'the message')})"
+        raise UsageError(problem, action="Use the same version of hexacell on both sides") from error

@@ -85,10 +85,8 @@ class RecordedRun:
 
     async def give(self, command: Command) -> None:
         """Refused: raises ``UsageError``."""
-        raise UsageError(
-            f"{type(command).__name__}: this run is recorded and takes no commands",
-            action="Go on in time, or leave it",
-        )
+        problem = f"{type(command).__name__}: this run is recorded and takes no commands"
+        raise UsageError(problem, action="Go on in time, or leave it")
 
     async def take_control(self) -> None:
         """Refused: raises ``UsageError``."""

@@ -123,11 +123,8 @@ def _name_in_kernel(config: Path) -> AbstractContextManager[object]:
         named.close()
         if error.errno != errno.EADDRINUSE:
             return nullcontext()
-        raise CellBusy(
-            "the cell is in use by another process, whose lock file was deleted",
-            subject=config,
-            action="Wait until that has ended, or stop it",
-        ) from error
+        problem = "the cell is in use by another process, whose lock file was deleted"
+        raise CellBusy(problem, subject=config, action="Wait until that has ended, or stop it") from error
     return named
 
 

@@ -57,10 +57,8 @@ def _exclusion_of(cell: Cell, name: str, planned: Sequence[VisitedPose]) -> Mapp
         )
     orientation, pose = poses[name]
     if orientation == 1:
-        raise UsageError(
-            f"{name} is the reference of its point, from which the gauges measure",
-            action=f"Exclude the whole point: {name.partition('.')[0]}",
-        )
+        problem = f"{name} is the reference of its point, from which the gauges measure"
+        raise UsageError(problem, action=f"Exclude the whole point: {name.partition('.')[0]}")
     if cell.settings.identification.poses is not None:  # a list has this pose, and perhaps others near it
         return {"pose": list(pose.as_tuple()), "within_mm": 0.0, "within_deg": 0.0}
     # Poses are selected as a run goes, so it never commands exactly what was planned: those near count.

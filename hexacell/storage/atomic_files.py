@@ -153,11 +153,8 @@ def write_atomically(
             _write_like(target, temporary, data, new_mode, for_everybody=for_everybody)
             is_size_right = expected is None or target.stat().st_size == len(expected)
             if expected is not None and not (is_size_right and target.read_bytes() == expected):
-                raise FileError(
-                    "the file was changed by somebody else just now and is left unchanged",
-                    subject=target,
-                    action="Run again",
-                )
+                problem = "the file was changed by somebody else just now and is left unchanged"
+                raise FileError(problem, subject=target, action="Run again")
             os.replace(temporary, target)  # noqa: PTH105 - named as the system call it is
     with os_errors("was replaced, but a power cut may undo that", path):
         sync_folder(target.parent)

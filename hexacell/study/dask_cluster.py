@@ -199,11 +199,8 @@ async def _require_same_version(client: distributed.Client, address: str) -> Non
         # One that has left meanwhile says nothing.
         if version != __version__ and not isinstance(version, OSError):
             has = f"hexacell {version}" if isinstance(version, str) else "no hexacell that can be imported"
-            raise ClusterError(
-                f"has {has}, this computer {__version__}",
-                subject=place,
-                action=f"Install hexacell=={__version__} there",
-            )
+            problem = f"has {has}, this computer {__version__}"
+            raise ClusterError(problem, subject=place, action=f"Install hexacell=={__version__} there")
 
 
 def _in_version(

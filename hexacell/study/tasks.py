@@ -151,12 +151,8 @@ def _known(path: Path, kept: TypeAdapter[_Kept[ResultType]]) -> dict[str, Result
         try:
             result = kept.validate_json(line)
         except ValidationError as error:
-            raise FileError(
-                "this is not a result of this study",
-                subject=path,
-                line=number,
-                action="Name another folder",
-            ) from error
+            problem = "this is not a result of this study"
+            raise FileError(problem, subject=path, line=number, action="Name another folder") from error
         found[result.key] = result.outcome
     if rest and not (found or rest.startswith('{"key":')):
         raise FileError("this is no study", subject=path, action="Name another folder")

@@ -81,7 +81,5 @@ def _held_out_poses(known: Knowledge, assessed: Assessment) -> PosesByPoint:
         return poses_before(known, assessed.found)
     except LimitError as error:
         verdict, *_ = findings(assessed)
-        raise LimitError(
-            f"{verdict} With this geometry no held-out pose can be measured: {error.problem}",
-            action=error.action,
-        ) from error
+        problem = f"{verdict} With this geometry no held-out pose can be measured: {error.problem}"
+        raise LimitError(problem, action=error.action) from error

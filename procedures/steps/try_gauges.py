@@ -98,13 +98,11 @@ def _mistake(
     named = [gauges[number] for number in concerned]
     of_one, of_several, action = MISTAKES[mistake]
     problem = of_several if len(named) > 1 else of_one
-    shown = "; ".join(f"{gauges[n].name} showed {_numbers(response[n])}" for n in concerned)
+    shown = "; ".join(
+        f"{gauges[n].name} showed {', '.join(f'{value:+.3f}' for value in response[n])}" for n in concerned
+    )
     return MountingError(
         f"{problem}: while the ball moved by 1 mm along x, y and z in turn, {shown} mm",
         subject=f"gauge{'s' if len(named) > 1 else ''} {', '.join(gauge.name for gauge in named)}",
         action=action,
     )
-
-
-def _numbers(row: Array) -> str:
-    return ", ".join(f"{value:+.3f}" for value in row)

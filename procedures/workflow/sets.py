@@ -100,10 +100,8 @@ class SetSteps:
         """Move to the set's reference by a checked path; raises ``NoSafePath``."""
         move = reference_move(state, key)
         if not state.refused.allows(move.pose):
-            raise NoSafePath(
-                f"{key}: the controller refuses its reference {move.target}, to which it must return",
-                action="Widen the limits of the controller, then continue",
-            )
+            problem = f"{key}: the controller refuses its reference {move.target}, to which it must return"
+            raise NoSafePath(problem, action="Widen the limits of the controller, then continue")
         return self.towards(state, move, ball)
 
     def is_clear_both_ways(

@@ -72,10 +72,8 @@ def report(options: argparse.Namespace, console: Console) -> ExitCode:
         action = "Name one that ends in .html, .pdf or .xml"
         raise UsageError("reports of this kind are not made", subject=target, action=action)
     if options.compare is not None and target.suffix == CERTIFICATE:
-        raise UsageError(
-            "a certificate compares nothing",
-            action="Leave --compare away, or name a file that ends in .pdf",
-        )
+        problem = "a certificate compares nothing"
+        raise UsageError(problem, action="Leave --compare away, or name a file that ends in .pdf")
     output.require()
     earlier = None if options.compare is None else reported_run(options.compare)
     run = reported_run(options.run)

@@ -43,10 +43,8 @@ def run_to_resume(cell: Cell, named: str) -> RunFolder:
     found = {run: run_summary(run) for run in run_folders(cell)}
     last_events = {run: one.ended for run, one in found.items() if one.ended and not one.is_over}
     if not last_events:
-        raise UsageError(
-            "no run of this cell was interrupted",
-            action=f"Name one; the cell's runs are in {runs_folder(cell)}",
-        )
+        problem = "no run of this cell was interrupted"
+        raise UsageError(problem, action=f"Name one; the cell's runs are in {runs_folder(cell)}")
     return max(last_events, key=last_events.__getitem__)
 
 

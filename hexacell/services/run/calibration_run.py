@@ -227,10 +227,8 @@ def _resumed_start(request: RunRequest) -> events.RunStarted:
     if state.ended is not None:
         raise UsageError(f"the run {request.folder.path} is over: {state.ended.line}")
     if not has_same_cell(state.started, request.cell):
-        raise UsageError(
-            f"{request.cell.path} has changed since the run began",
-            action="Undo the change, or begin a new run",
-        )
+        problem = f"{request.cell.path} has changed since the run began"
+        raise UsageError(problem, action="Undo the change, or begin a new run")
     if state.started.mode != request.mode.value:
         raise UsageError(
             f"the run was begun in the mode {state.started.mode}", action="Resume it in that mode"

@@ -73,11 +73,8 @@ def _copy_cell(cell_file: Path, folder: Path) -> Path:
     """Replace what an earlier demo left in ``folder`` by a copy of the cell."""
     if folder.is_dir() and any(folder.iterdir()):
         if not (folder / MARKER).is_file() or (folder / MARKER).is_symlink():
-            raise FileError(
-                "this folder is not empty, and no earlier demo's",
-                subject=folder,
-                action="Choose another with --folder",
-            )
+            problem = "this folder is not empty, and no earlier demo's"
+            raise FileError(problem, subject=folder, action="Choose another with --folder")
         # The marker is kept so that a removal that fails can be repeated.
         configs = list(folder.glob(f"*{CONTROLLER}"))
         kept = {folder / MARKER, *(folder / lock_path(config).name for config in configs)}

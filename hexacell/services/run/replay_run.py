@@ -88,22 +88,16 @@ def _cell(scratch: Path, started: RunStarted, journal: Path) -> Cell:
     try:
         return load_cell(path)
     except HexacellError as error:
-        raise FileError(
-            f"this version cannot read the cell file in it ({error})",
-            subject=journal,
-            action=f"Replay it with {started.software}",
-        ) from error
+        problem = f"this version cannot read the cell file in it ({error})"
+        raise FileError(problem, subject=journal, action=f"Replay it with {started.software}") from error
 
 
 def _identification(cell: Cell, started: RunStarted) -> IdentificationSettings:
     """The plan; a list of poses is written to a file in the temporary folder."""
     plan = cell.settings.identification
     if started.pose_list is None and plan.poses is not None:
-        raise FileError(
-            f"it names a list of poses, {plan.poses}, and does not have it",
-            subject="the journal",
-            action=RESTORE,
-        )
+        problem = f"it names a list of poses, {plan.poses}, and does not have it"
+        raise FileError(problem, subject="the journal", action=RESTORE)
     if started.pose_list is None:
         return plan
     (cell.path.parent / POSES).write_text(started.pose_list, encoding="utf-8")

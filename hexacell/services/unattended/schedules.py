@@ -181,11 +181,8 @@ def _cell_of(path: Path) -> Path | None:
 def _require_ours(path: Path, cell: Path) -> None:
     OutputFile(path, UNIT).require()
     if path.exists() and (other := _cell_of(path)) != cell:
-        raise UsageError(
-            f"this is the schedule of {other or 'another cell'}",
-            subject=path,
-            action="Give one of the cells another name",
-        )
+        problem = f"this is the schedule of {other or 'another cell'}"
+        raise UsageError(problem, subject=path, action="Give one of the cells another name")
 
 
 def _owner_of(cell: Path) -> str:

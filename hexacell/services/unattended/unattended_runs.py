@@ -29,10 +29,8 @@ def local_now() -> datetime:
 def refuse_quiet_hours(settings: CellSettings, at: datetime) -> None:
     """Refuse a run that would begin in quiet hours; raises ``OutOfTime``."""
     if (until := quiet_until(settings.unattended, at)) is not None:
-        raise OutOfTime(
-            f"these are quiet hours of the cell, until {until:%H:%M}: no run begins without a person",
-            action="Let it begin later, or change quiet_hours in [unattended]",
-        )
+        problem = f"these are quiet hours of the cell, until {until:%H:%M}: no run begins without a person"
+        raise OutOfTime(problem, action="Let it begin later, or change quiet_hours in [unattended]")
 
 
 def refused_start(request: RunRequest, error: HexacellError, began: datetime, at: datetime) -> float | None:

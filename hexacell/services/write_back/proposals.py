@@ -217,11 +217,8 @@ def _require_unedited(proposal: Proposal) -> None:
     if fingerprint(*change.paths) == change.sha256_before:
         return
     if holds_provisional(proposal.folder, change.paths):
-        raise UsageError(
-            "the run was interrupted and left its provisional geometry here",
-            subject=change.path,
-            action="Resume that run, which takes it back",
-        )
+        problem = "the run was interrupted and left its provisional geometry here"
+        raise UsageError(problem, subject=change.path, action="Resume that run, which takes it back")
     stated = (change.before, change.corrections_before), (change.after, change.corrections_after)
     before, after = (
         ControllerGeometry(Geometry.of(proposal.parameters, geometry), (), corrections=corrections)

@@ -123,9 +123,7 @@ def test_what_makes_no_sense_is_refused(schedule, units) -> None:
         ("", "02:30", None),
     ],
 )
-def test_a_time_that_one_night_does_not_have_is_warned_of(
-    schedule, monkeypatch, zone, daily, other
-) -> None:
+def test_a_time_that_one_night_does_not_have_is_warned_of(schedule, monkeypatch, zone, daily, other):
     if not (zones := Path("/usr/share/zoneinfo")).is_dir():
         pytest.skip("there are no time zones here")
     monkeypatch.setattr(scheduled_run, "LOCAL_TIME", zones / zone)

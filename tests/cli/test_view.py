@@ -103,9 +103,7 @@ def test_a_cell_is_seen_as_it_is_now_in_a_page_or_a_picture(typed_here, cell_fol
     assert opened == []
 
 
-def test_what_cannot_be_shown_is_told_in_a_line(
-    typed_here, cell_folder, run, monkeypatch, tmp_path
-) -> None:
+def test_what_cannot_be_shown_is_told_in_a_line(typed_here, cell_folder, run, monkeypatch, tmp_path):
     refused = typed_here("view", cell_folder.cell, "--output", "robot.png", "--no-open")
     assert (refused.code, "ends in .html or .svg" in refused.err) == (2, True)
     absent = typed_here("view", tmp_path / "absent.toml", "--no-open")

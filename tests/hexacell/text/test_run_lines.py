@@ -134,11 +134,6 @@ def test_what_a_question_offers_is_an_answer_and_nothing_else() -> None:
         (GRAVE, {"bench\n": "somebody", "no\n": None}, ("\n", "yes\n", "y\n", "benc\n")),
     ]
     assert question_view(FAILURE, None).request == "Type one of retry, measure-again, redo-set, abort: "
-    what = "Something went wrong, and the robot stands still"
-    assert (
-        question_text(question_view(FAILURE, None))
-        == f"\n{what}\nIt broke.\n{question_view(FAILURE, None).request}"
-    )
     for question, answers, others in offered:
         for typed, answer in answers.items():
             choice = question_view(question, None, "somebody").typed_choice(typed)

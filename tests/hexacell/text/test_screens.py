@@ -198,13 +198,6 @@ def test_a_gauge_without_a_reading_is_not_old() -> None:
     assert lines[1][0].endswith(", 7.5 s ago")
 
 
-def test_a_question_is_a_persons_turn_with_the_key_that_shows_it() -> None:
-    question = ask_placement(SetKey(phase=Phase.IDENTIFY, point=3), Pose(0.0, 0.0, 0.0))
-    banner = run_banner(pictured(described(), QuestionChanged(question=question)), None)
-    assert banner.word == "YOUR TURN"
-    assert banner.action == "Put the gauges around the ball at point 3: press w"
-
-
 def test_what_is_to_be_mended_comes_before_everything_else() -> None:
     snapshot = LiveSnapshot(gauges=(gauge(problem="gauge x: silent"),), stop_reason="open")
     banner = cell_banner(snapshot, "")

@@ -76,9 +76,7 @@ NO_RECORDS = (b"[]", b"3", b'"text"', b"null", b"{}", b'{"n": 1}', b"\xff\xfe")
         *((one + b"\n", b"", 1) for one in NO_RECORDS),
     ],
 )
-def test_two_damaged_lines_or_one_in_front_are_more_than_a_torn_tail(
-    path, written, head, tail, line
-) -> None:
+def test_two_damaged_lines_or_one_in_front_are_more_than_a_torn_tail(path, written, head, tail, line):
     path.write_bytes(head + written + tail)
     with pytest.raises(FileError, match=rf":{line}: .*damaged"):
         read_journal(path)

@@ -128,7 +128,7 @@ async def test_a_person_is_told_what_to_do_and_the_station_begins_again(make_rig
     (problem,) = rig.operator.problems
     assert re.search(words, problem)
     assert rig.operator.placed[:3] == [1, 1, 2], "the gauges were placed again"
-    (failed,) = happened(rig, events.Failed)
+    failed, _ = happened(rig, events.Failed)
     assert is_exchanged or failed.failure is FailureKind.MOUNTING
 
 

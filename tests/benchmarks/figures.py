@@ -25,9 +25,8 @@ DID_NOT_END = "did not run to its end"
 
 HEAD = """# Figures of the benchmarks
 
-Written by `make figures` from `build/figures.json`, which `make bench` writes (`FULL=1`: with the samples \
-of the targets, for hours). A figure of another commit has its mark. \
-**missed** is a target that was not reached. [Measured](measured.md) has what else was found.
+Written by `make figures` after `make bench` (`FULL=1`: with the samples of the targets, for hours). \
+Figures of other commits are marked. [More](measured.md).
 
 """
 
@@ -229,6 +228,7 @@ def table(figures: Iterable[Figure], present: str) -> str:
     """
     every = sorted(figures, key=lambda one: one.benchmark.partition("::")[0])
     listed = [one for one in every if one.met is not None or one.name == DID_NOT_END]
+    listed = [one for one in listed if not one.target.endswith(" inf")]
     never = [one for one in listed if one.met and one.target == str(NEVER)]
     others = _marks({one.commit for one in every if one.commit.rstrip("+") != present.rstrip("+")})
     alike: Rows = {}

@@ -13,6 +13,7 @@ from drivers.gauges.sylvac import SylvacGauge
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.wire_trace import ENTRY_BYTES, TraceEntry, TrafficDirection, WireTrace, read_trace
 from hexacell.cell.devices import GaugeSettings
+from hexacell.errors import FileError
 
 
 def entry(data, time_s=1.5):
@@ -73,6 +74,11 @@ def test_the_text_of_a_trace_is_read_back(entries):
     for one in entries:
         trace(one)
     assert read_trace(f"# a remark\n{trace.text()}") == tuple(entries)
+
+
+def test_what_is_no_entry_is_named_with_its_line():
+    with pytest.raises(FileError, match="line 2 is no entry of a wire trace: 'hello'"):
+        read_trace("1.500000 /dev/ttyUSB0 > 3f 0d  ?.\nhello\n")
 
 
 def logged(caplog: pytest.LogCaptureFixture, name: str) -> list[tuple[str, str]]:

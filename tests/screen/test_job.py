@@ -120,7 +120,7 @@ async def test_from_mounting_to_approval(cell, run, history, opened) -> None:
         assert re.search(r"S1y -\d+\.\d{3} -\d+\.\d{3} -5\.751 0\.095 +changed \(60", shown(pilot))
 
 
-async def test_any_record_in_the_table_is_measured_again_once_it_is_confirmed(cell, run, history, opened):
+async def test_any_record_in_the_table_is_measured_again_once_confirmed(cell, run, history, opened):
     async with opened(workplace_of(cell, run, history[:300])) as pilot:
         await until_shown(pilot, "point 5")
         await press(pilot, "up", "up", "enter", "n")
@@ -172,9 +172,7 @@ async def test_motion_begins_on_an_explicit_yes_and_a_fault_says_what_to_do(cell
         assert run.given == [Answer("yes"), Answer("retry")]
 
 
-async def test_of_faults_and_questions_only_what_waits_now_is_shown_and_all_of_it(
-    cell, run, history, opened
-):
+async def test_of_faults_and_questions_what_waits_is_shown_and_all_of_it(cell, run, history, opened):
     lost = f"gauge y: port /tmp/{'long/' * 20}y was lost. Plug it in and open the device again"
     failed = events.Failed(
         step=None, failure=FailureKind.LINK_LOST, attempt=1, reason=lost, action=Action.ASK

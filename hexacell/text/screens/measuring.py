@@ -1,5 +1,6 @@
 """A run that is being measured: how far it is, its records, the predicted accuracy, faults in words."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from statistics import median
@@ -7,13 +8,14 @@ from statistics import median
 from hexacell.campaign.budget import TimeModel
 from hexacell.cell.model import CellSettings
 from hexacell.lengths import from_to
+from hexacell.results.result import RecordResidual
 from hexacell.run_process.messages import HostFailed
 from hexacell.text.layout import duration
 from hexacell.text.screens.questions import RECOVERIES
 from hexacell.text.screens.run_picture import RunPicture, Setback
 from hexacell.text.screens.views import Column, FaultView, PlotView, Row, Series, Urgency
 from procedures.calibration.calibration import Mode
-from procedures.run.keys import Phase
+from procedures.run.keys import Phase, SetKey
 from procedures.steps import events
 
 RESUMABLE = "What was measured is kept. Mend what is to be mended, then r in 2 Preflight resumes the run."
@@ -120,11 +122,11 @@ def records_by_name(picture: RunPicture) -> dict[str, events.RecordTaken]:
 
 def record_rows(picture: RunPicture) -> tuple[Row, ...]:
     """A row for each record."""
-    rows = []
+    rows, of_fit = [], residuals_of(picture)
     for name, sample in records_by_name(picture).items():
         values = tuple(f"{value:+.3f}" for value in sample.deviation_mm)
         shown, urgency = ("ref." if sample.orientation == 1 else "", ""), Urgency.CALM
-        if (off := off_of(picture, sample)) is not None:
+        if (off := off_of(picture, sample, of_fit)) is not None:
             is_far = off[1] > SUSPICIOUS_SIGMAS
             shown = f"{off[0]:+.3f}", f"{off[1]:.1f}{' !' if is_far else ''}"
             urgency = Urgency.ATTENTION if is_far else Urgency.CALM
@@ -132,18 +134,23 @@ def record_rows(picture: RunPicture) -> tuple[Row, ...]:
     return tuple(rows)
 
 
-def off_of(picture: RunPicture, sample: events.RecordTaken) -> tuple[float, float] | None:
+def residuals_of(picture: RunPicture) -> Mapping[tuple[SetKey, int], RecordResidual]:
+    """What the fit leaves of each record, by set and orientation; empty before it."""
+    residuals = () if picture.state.identified is None else picture.state.identified.residuals
+    return {(SetKey(phase=Phase.IDENTIFY, point=one.point), one.orientation): one for one in residuals}
+
+
+def off_of(
+    picture: RunPicture, sample: events.RecordTaken, of_fit: Mapping[tuple[SetKey, int], RecordResidual]
+) -> tuple[float, float] | None:
     """By how much a record is off, mm, at its largest axis, and how many sigma that is; if it is known.
 
     Off the fit, once there is one; before, and of records that are not in it, off what was predicted.
     """
     if sample.orientation == 1:
         return None
-    identified, place = picture.state.identified, (sample.at.point, sample.orientation)
-    if identified is not None and sample.at.phase is Phase.IDENTIFY:
-        of_fit = {(one.point, one.orientation): one for one in identified.residuals}
-        if (residual := of_fit.get(place)) is not None:
-            return max(residual.mm, key=abs), residual.sigmas
+    if (residual := of_fit.get((sample.at, sample.orientation))) is not None:
+        return max(residual.mm, key=abs), residual.sigmas
     if (expected := picture.expected.get((sample.at, sample.orientation))) is None:
         return None
     pairs = zip(sample.deviation_mm, expected.deviation_mm, expected.sigma_mm, strict=True)

@@ -9,7 +9,7 @@ from hexacell.text.config_changes import pending_text
 from hexacell.text.line_face import whole_event_text
 from hexacell.text.parameters import rows_of_run
 from hexacell.text.screens.banner import verdict_urgency
-from hexacell.text.screens.measuring import SUSPICIOUS_SIGMAS, accuracy_plot, off_of
+from hexacell.text.screens.measuring import SUSPICIOUS_SIGMAS, accuracy_plot, off_of, residuals_of
 from hexacell.text.screens.questions import PERSON, approval_refusal, yes_or_no
 from hexacell.text.screens.run_picture import RunPicture
 from hexacell.text.screens.views import Column, Line, PlotView, QuestionView, Row, Series, Urgency
@@ -154,7 +154,8 @@ def deviation_plot(state: RunState) -> PlotView:
 def residual_plot(picture: RunPicture) -> PlotView:
     """By how many standard deviations each record is off the fit, or before it off what was predicted."""
     samples = enumerate(picture.state.samples(Phase.IDENTIFY), start=1)
-    found = [(float(number), off_of(picture, sample)) for number, sample in samples]
+    of_fit = residuals_of(picture)
+    found = [(float(number), off_of(picture, sample, of_fit)) for number, sample in samples]
     known = tuple((number, off[1]) for number, off in found if off is not None)
     return PlotView(
         title="Residual, sigma",

@@ -10,7 +10,13 @@ from hexacell.checks.check_result import CheckResult, ParameterChange
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.text.layout import COLUMNS
 from hexacell.text.line_face import event_text
-from hexacell.text.verdict import check_text, not_checked, teaching_sentence, verification_text
+from hexacell.text.verdict import (
+    check_text,
+    not_checked,
+    teaching_line,
+    teaching_sentence,
+    verification_text,
+)
 from hexacell.verdict.decision import GeometryErrors, JudgedError, Verdict, VerifiedAccuracy
 from hexacell.verdict.either_side import EitherSide
 from hexacell.verdict.model_evidence import ModelTest
@@ -123,5 +129,6 @@ def test_what_must_be_taught_anew_is_an_order_only_where_it_must(mm, deg, figure
     sentence = teaching_sentence(moved)
     assert sentence.startswith("Teach anew: Cartesian points, work and tool frames move by")
     assert f"by up to {figures} at the task poses. Points taught by joints stay." in sentence
+    assert figures in teaching_line(moved)
     within = moved.model_copy(update={"is_within_limits": True})
     assert teaching_sentence(within).startswith("Nothing need be taught anew: taught points and frames")

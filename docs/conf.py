@@ -91,8 +91,6 @@ def pages_of_sections(_app: Sphinx, name: str, source: list[str]) -> None:
     for section in source[0].split("\n## ")[1:]:
         links = re.findall(r"^- \[(.+)\]\((.+)\.md\)$", section, flags=re.MULTILINE)
         pages = [f"{title} <{link}>" for title, link in links]
-        if ("Measured", "measured") in links and (Path(__file__).parent / "measured-figures.md").exists():
-            pages.append("Figures of the benchmarks <measured-figures>")  # written by make figures
         caption = f":caption: {section.splitlines()[0]}"
         source[0] += "\n".join(["", "```{toctree}", ":hidden:", caption, "", *pages, "```", ""])
 

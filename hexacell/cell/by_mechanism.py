@@ -1,5 +1,7 @@
 """The model of the cell files of one mechanism: keys of its parameters, and units of its joint variables.
 
+The options of the controller are those of its protocol.
+
 A field whose alias ends in the unit of the joint variables is in that unit: ``encoder`` is the key
 ``encoder_mm`` where joints slide, and ``encoder_deg`` where they turn. The sections are written for mm;
 here they are derived for deg, with other keys and defaults, and nothing else changes.
@@ -12,13 +14,20 @@ from functools import cache
 from typing import Any, TypeVar
 
 from pydantic import Field, create_model
+from pydantic_core import PydanticUndefined
 
 from hexacell.cell.devices import EncoderSettings, LinearEncoderSettings, RotaryEncoderSettings
 from hexacell.cell.fields import GeometrySettings, InRange, NotNegative, Positive, Section
 from hexacell.cell.limits import LimitSettings, SpeedSettings
 from hexacell.cell.measuring import GuardSettings, NoiseSettings, TimingSettings
 from hexacell.cell.model import CellSettings, ToleranceSettings
-from hexacell.cell.robot import ControllerSettings, RobotSettings, RotaryControllerSettings, mechanism_of
+from hexacell.cell.robot import (
+    ControllerOptions,
+    ControllerSettings,
+    RobotSettings,
+    RotaryControllerSettings,
+    mechanism_of,
+)
 from hexacell.cell.simulation import SimulatedEncoders, SimulatedJoints, SimulatedMotion, SimulationSettings
 from hexacell.cell.uncertainty import (
     CommonUncertaintySettings,
@@ -64,10 +73,15 @@ def in_joint_unit(section: type[SectionType], unit: JointUnit) -> type[SectionTy
 
 
 @cache
-def cell_model(mechanism: str, *, encoder_scales: bool) -> type[CellSettings]:
-    """The model of the cell files of one mechanism; raises ``UsageError`` if it is not installed.
+def cell_model(
+    mechanism: str, *, encoder_scales: bool, options: type[ControllerOptions] = ControllerOptions
+) -> type[CellSettings]:
+    """The model of the cell files of one mechanism and one controller.
 
     Each has one model only: settings of two would never be equal.
+
+    Raises:
+        UsageError: the mechanism is not installed.
     """
     found = mechanism_of(mechanism, encoder_scales=encoder_scales)
     parameters = found.parameters
@@ -85,6 +99,8 @@ def cell_model(mechanism: str, *, encoder_scales: bool) -> type[CellSettings]:
         controller, uncertainty = RotaryControllerSettings, RotaryUncertaintySettings
     elif found.words.guide is None:
         uncertainty = LinearUncertaintySettings
+    if options is not ControllerOptions:
+        controller = _derived(controller, options=_options_field(options))
     return _derived(
         CellSettings,
         uncertainty=(uncertainty, uncertainty()),
@@ -103,6 +119,14 @@ def cell_model(mechanism: str, *, encoder_scales: bool) -> type[CellSettings]:
             model=ModelSettings,
         ),
     )
+
+
+def _options_field(options: type[ControllerOptions]) -> tuple[type[ControllerOptions], Any]:
+    """A key of the controller's section, which may be left away if all options may."""
+    field = copy(ControllerSettings.model_fields["options"])
+    needed = any(one.is_required() for one in options.model_fields.values())
+    field.default = PydanticUndefined if needed else options()
+    return options, field
 
 
 def _in_unit(mechanism: Mechanism, **sections: type[Section]) -> dict[str, Any]:

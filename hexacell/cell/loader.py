@@ -12,12 +12,13 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from pydantic import SecretStr, ValidationError
+from pydantic.json_schema import models_json_schema
 
 from hexacell.cell.by_mechanism import cell_model
 from hexacell.cell.diagnostics import Diagnosis
 from hexacell.cell.fields import Section
 from hexacell.cell.model import CellSettings
-from hexacell.cell.robot import DEFAULT_MECHANISM
+from hexacell.cell.robot import DEFAULT_CONTROLLER, DEFAULT_MECHANISM, ControllerOptions
 from hexacell.errors import FileError, HexacellError, UsageError, did_you_mean, joined
 from hexacell.plugins import Group, load, names
 from hexacell.storage import toml_document
@@ -166,8 +167,15 @@ def settings_document(cell: Cell) -> dict[str, Any]:
 
 
 def schema() -> dict[str, Any]:
-    """The JSON Schema of a cell file, for editors and for other programs."""
-    return cell_model(DEFAULT_MECHANISM, encoder_scales=False).model_json_schema()
+    """The JSON Schema of a cell file, for editors and other programs, with each controller's options."""
+    found = cell_model(DEFAULT_MECHANISM, encoder_scales=False).model_json_schema()
+    each = dict.fromkeys(controller_options(one) for one in names(Group.CONTROLLERS))
+    refs, definitions = models_json_schema([(one, "validation") for one in each])
+    found["$defs"] |= definitions["$defs"]
+    section = found["$defs"]["ControllerSettings"]["properties"]["options"]
+    del section["$ref"]
+    section["anyOf"] = list(refs.values())
+    return found
 
 
 def validated(document: toml_document.TomlDocument, model: type[SectionType], path: Path) -> SectionType:
@@ -206,7 +214,36 @@ def _model(document: toml_document.TomlDocument) -> type[CellSettings]:
             did_you_mean(name, known) or f"Known are: {', '.join(known)}; or install the package with it"
         )
         raise document.error(("robot", "mechanism"), f"there is no mechanism '{name}'", action)
-    return cell_model(name, encoder_scales=robot.get("encoder_scales") is True)
+    scales = robot.get("encoder_scales") is True
+    return cell_model(name, encoder_scales=scales, options=_options(document))
+
+
+def _options(document: toml_document.TomlDocument) -> type[ControllerOptions]:
+    """The options of the controller's protocol; one that is not installed is reported with the devices."""
+    stated = document.data.get("controller")
+    protocol = stated.get("protocol", DEFAULT_CONTROLLER) if isinstance(stated, dict) else None
+    if protocol == DEFAULT_CONTROLLER or protocol not in names(Group.CONTROLLERS):
+        return ControllerOptions  # the default has none, and its driver takes a while to be imported
+    try:
+        return controller_options(protocol)
+    except HexacellError as error:
+        raise document.error(("controller", "protocol"), error.problem, error.action or "") from error
+
+
+def controller_options(protocol: str) -> type[ControllerOptions]:
+    """The options of a controller's protocol: ``Options`` of its driver, if it has any.
+
+    Raises:
+        UsageError: there is no such driver, it cannot be imported, or has options that are no
+            ``ControllerOptions``.
+    """
+    options = getattr(load(Group.CONTROLLERS, protocol), "Options", ControllerOptions)
+    if not (isinstance(options, type) and issubclass(options, ControllerOptions)):
+        raise UsageError(
+            f"the Options of controller protocol '{protocol}' are no ControllerOptions",
+            action="Derive them from hexacell.cell.robot.ControllerOptions, or inform the driver's maker",
+        )
+    return options
 
 
 def dump(settings: Section, remark: Remark = lambda _: None) -> str:

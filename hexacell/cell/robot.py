@@ -1,6 +1,7 @@
 """Sections of the cell file: the mechanism with its drawing, and its controller with the geometry."""
 
 from functools import cache
+from pathlib import Path
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -32,6 +33,7 @@ STARTUP_WORDS: tuple[StartupWord, ...] = ("reset-estop", "switch-on", "home")
 
 DEFAULT_MECHANISM = "hexaglide"
 SCREW_MECHANISM = "gough-stewart"
+DEFAULT_CONTROLLER = "linuxcncrsh"
 
 
 class ScrewSettings(Section):
@@ -110,11 +112,23 @@ class FurtherFileSettings(Section):
     taught: Text | None = key(None, "copy of this file, from the same day as that of the first one")
 
 
+class ControllerOptions(Section):
+    """What one protocol needs beside the keys that all have: ``Options`` of its driver is derived of it."""
+
+    def beside(self, folder: Path) -> Self:
+        """The options with the files that they name found; ``folder`` has the cell file."""
+        del folder  # these name none
+        return self
+
+
 class ControllerSettings(Section):
     """The robot's controller and the file, or the files, with its geometry."""
 
     protocol: Text = key(
-        "linuxcncrsh", "protocol of the controller: linuxcncrsh, or one that a plug-in adds"
+        DEFAULT_CONTROLLER, "protocol of the controller: linuxcncrsh, adapter, or one that a plug-in adds"
+    )
+    options: ControllerOptions = key(
+        ControllerOptions(), "what this protocol needs beside the keys that all have"
     )
     host: Host = key("127.0.0.1", "network name or address of the controller")
     port: int | None = key(None, "TCP port of the controller", ge=1, le=65535)

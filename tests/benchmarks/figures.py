@@ -3,6 +3,8 @@
 ``python -m tests.benchmarks.figures`` writes the table, see ``make figures``.
 """
 
+import csv
+import io
 import json
 import math
 import os
@@ -20,15 +22,9 @@ from tests.benchmarks.samples import samples
 
 CHECKOUT = Path(__file__).parents[2]
 FIGURES = CHECKOUT / "build" / "figures.json"
-TABLE = CHECKOUT / "docs" / "measured-figures.md"
+TABLE = CHECKOUT / "docs" / "measured-figures.csv"
 DID_NOT_END = "did not run to its end"
-
-HEAD = """# Figures of the benchmarks
-
-Written by `make figures` after `make bench` (`FULL=1`: with the samples of the targets, for hours). \
-Figures of other commits are marked. [More](measured.md).
-
-"""
+MISSED = "missed"
 
 
 @dataclass(frozen=True)
@@ -212,7 +208,7 @@ def _joined(rows: Rows) -> Rows:
     for (module, name, unit, target), ones in rows.items():
         values, every, targets = {one.shown for one in ones}, ones, target
         same = (module, name, unit, *values)
-        if len(values) == 1 and same in last and "**" not in target + last[same][3]:
+        if len(values) == 1 and same in last and MISSED not in target + last[same][3]:
             every = [*joined.pop(last[same]), *ones]
             targets = f"{last[same][3]}; {target}"
         last[same] = (module, name, unit, targets)
@@ -221,7 +217,7 @@ def _joined(rows: Rows) -> Rows:
 
 
 def table(figures: Iterable[Figure], present: str) -> str:
-    """The figures that have a target as a page, and what did not come to its end.
+    """The figures that have a target as CSV, and what did not come to its end.
 
     Cases of a benchmark that have the same target share a row, with their different values in the order
     in which they come; a value that several cases have is shown once.
@@ -236,28 +232,33 @@ def table(figures: Iterable[Figure], present: str) -> str:
         if one not in never:
             target = one.target.replace("at most", "\N{LESS-THAN OR EQUAL TO}")
             marks = [target.replace("at least", "\N{GREATER-THAN OR EQUAL TO}")] if target else []
-            marks += [] if one.met else ["**missed**"]
+            marks += [] if one.met else [MISSED]
             marks += [] if one.commit.rstrip("+") == present.rstrip("+") else [others[one.commit]]
             alike.setdefault((_module(one), _name(one), one.unit, ", ".join(marks)), []).append(one)
     alike = _joined(alike)
-    rows = ["| benchmark | figure | measured | target |", "|---|---|---|---|"]
+    rows = [("benchmark", "figure", "measured", "target"), _summary(every, listed, never, present, others)]
     above = ""
     for (module, name, unit, target), ones in alike.items():
-        benchmark = f"{module} {', '.join(dict.fromkeys(filter(None, map(_case, ones))))}"
+        benchmark = f"{module} {', '.join(dict.fromkeys(filter(None, map(_case, ones))))}".strip()
         values = ", ".join(dict.fromkeys(one.shown.removesuffix(unit).strip() for one in ones))
-        cells = ("" if benchmark == above else benchmark, name, f"{values} {unit}", target)
+        rows.append(("" if benchmark == above else benchmark, name, f"{values} {unit}".strip(), target))
         above = benchmark
-        row = f"| {' | '.join(' '.join(cell.replace('|', '/').split()) for cell in cells)} |"
-        rows.append(row.replace("|  |", "||", 1))
-    missed = sum(not one.met for one in listed)
-    counts = (
-        f"{len(every)} figures, {len(listed)} of them with a target, of which {missed} were missed; "
-        f"the {len(never)} of what must never happen, and did not, are not listed."
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(
+        [" ".join(cell.split()) for cell in row] for row in rows
     )
+    return text.getvalue()
+
+
+def _summary(
+    every: list[Figure], listed: list[Figure], never: list[Figure], present: str, others: dict[str, str]
+) -> tuple[str, str, str, str]:
+    """The row about all figures: of which commit they are, and how many miss their target."""
     machines = "; ".join(sorted({one.machine for one in every}))
     of_others = "".join(f"; {mark} {commit}" for commit, mark in others.items())
-    text = f"{HEAD}Commit {present}{of_others}; {machines}. {counts}\n\n"
-    return text + "\n".join(rows) + "\n"
+    counts = f"{len(every)}; the {len(never)} of what must never happen, and did not, are not listed below"
+    missed = f"{sum(not one.met for one in listed)} of {len(listed)} {MISSED}"
+    return "all", f"commit {present}{of_others}; {machines}", counts, missed
 
 
 def _case(figure: Figure) -> str:

@@ -30,7 +30,7 @@ def device_addresses(cell: Cell, *, other_processes: bool = False) -> Iterator[C
     Raises ``HexacellError``: a protocol without driver, an unreadable password, an impossible simulation.
     """
     require_plugins(cell)
-    settings = _with_encoder_files(with_passwords(cell.settings, cell.path.parent), cell.path.parent)
+    settings = _with_files(with_passwords(cell.settings, cell.path.parent), cell.path.parent)
     if settings.simulation is None:
         yield settings
         return
@@ -43,15 +43,21 @@ def device_addresses(cell: Cell, *, other_processes: bool = False) -> Iterator[C
         yield simulated.settings
 
 
-def _with_encoder_files(settings: CellSettings, folder: Path) -> CellSettings:
-    """The settings with the paths of the DBC and EDS files, which are relative to the cell file."""
+def _with_files(settings: CellSettings, folder: Path) -> CellSettings:
+    """The settings with the paths of what devices need, which are relative to the cell file."""
     described, eds = settings.encoders.dbc, settings.encoders.eds
     changes: dict[str, object] = {}
     if described is not None:
         changes["dbc"] = described.model_copy(update={"file": str(folder / described.file)})
     if eds is not None:
         changes["eds"] = str(folder / eds)
-    return settings.model_copy(update={"encoders": settings.encoders.model_copy(update=changes)})
+    options = {"options": settings.controller.options.beside(folder)}
+    return settings.model_copy(
+        update={
+            "encoders": settings.encoders.model_copy(update=changes),
+            "controller": settings.controller.model_copy(update=options),
+        }
+    )
 
 
 AGREEMENT_SIGMAS = 5.0

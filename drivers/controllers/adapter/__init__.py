@@ -1,0 +1,1 @@
+"""A controller behind a program of any language, by lines of JSON (docs/controller-adapter.md)."""

@@ -1,0 +1,114 @@
+"""Serves a robot by the adapter protocol on stdin and stdout: all that a controller's own program needs.
+
+Only Python's own library is used, and nothing of this program: the file also runs under the interpreter
+that a controller comes with.
+"""
+
+from __future__ import annotations
+
+import json
+import queue
+import sys
+import threading
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol, TextIO
+
+VERSION = 1
+Told = Mapping[str, Any]
+Report = Callable[[Sequence[float]], None]
+"""Tells where the robot is on its way: x, y, z, mm, and a, b, c, deg."""
+
+
+class FailedError(Exception):
+    """A failed request: its kind (``refused``, ``pose``, ``interrupted``, ``fault``), reason and more."""
+
+    def __init__(self, kind: str, reason: str, **more: Any) -> None:  # noqa: ANN401 - as the protocol allows
+        self.answer = {"kind": kind, "reason": reason, **more}
+        super().__init__(reason)
+
+
+class Robot(Protocol):
+    """What a program implements. ``status``, ``position`` and ``stop`` are called while others work.
+
+    What is returned is the answer's ``done``; a failure is a :class:`FailedError`.
+    """
+
+    def hello(self, settings: Told) -> Told:
+        """Connect, by the settings of the cell file; its name and description. Nothing moves."""
+
+    def status(self) -> Told:
+        """``estop``, ``enabled``, ``homed``, ``remote``, ``moving``, ``errors``, ``heartbeat``."""
+
+    def position(self) -> Told:
+        """``pose`` (6,), mm and deg, and ``joints`` (6,); None where it does not know."""
+
+    def start_up(self, action: str) -> None:
+        """``reset-estop``, ``switch-on``, ``switch-off``, ``home`` or ``reload``; returns when it is so."""
+
+    def move(self, pose: Sequence[float], duration_s: float, report: Report) -> None:
+        """Move straight to a pose; returns at rest there, and is ``interrupted`` by a stop."""
+
+    def stop(self) -> None:
+        """Stop the motion in place, at once; returns at rest."""
+
+
+def serve(robot: Robot, lines: TextIO = sys.stdin, answers: TextIO = sys.stdout) -> None:
+    """Answer each line of requests until they end; then the robot is stopped."""
+    _Service(robot, lines, answers).run()
+
+
+class _Service:
+    def __init__(self, robot: Robot, lines: TextIO, answers: TextIO) -> None:
+        self._robot, self._lines, self._answers = robot, lines, answers
+        self._writing = threading.Lock()
+        self._orders: queue.SimpleQueue[Told | None] = queue.SimpleQueue()
+
+    def run(self) -> None:
+        worker = threading.Thread(target=self._work, daemon=True)
+        worker.start()
+        for line in self._lines:
+            request = json.loads(line)
+            if request["do"] in {"hello", "status", "position", "stop"}:
+                self._answer(request)
+            else:  # what takes its time; the others do not wait for it
+                self._orders.put(request)
+        self._robot.stop()  # nobody is there any more who could
+        self._orders.put(None)
+        worker.join()
+
+    def _work(self) -> None:
+        while (request := self._orders.get()) is not None:
+            self._answer(request)
+
+    def _answer(self, request: Told) -> None:
+        try:
+            done = self._done(request)
+        except FailedError as failure:
+            self._send(request, failed=failure.answer)
+        except Exception as error:  # whatever fails in a controller's own library
+            traceback.print_exc()
+            self._send(request, failed={"kind": "fault", "reason": f"{type(error).__name__}: {error}"})
+        else:
+            self._send(request, done=done or {})
+
+    def _done(self, request: Told) -> Told | None:
+        robot, do = self._robot, request["do"]
+        if do == "hello":
+            if request["version"] != VERSION:
+                raise FailedError("refused", f"this program has version {VERSION} of the protocol")
+            return {"version": VERSION, "length": "mm", "angle": "deg", **robot.hello(request["settings"])}
+        if do in {"status", "position", "stop"}:
+            answer: Told | None = getattr(robot, do)()
+            return answer
+        if do == "move":
+            robot.move(
+                request["pose"], request["duration_s"], lambda pose: self._send(request, at=list(pose))
+            )
+        else:
+            robot.start_up(do)
+        return None
+
+    def _send(self, request: Told, **answer: Any) -> None:  # noqa: ANN401 - what JSON can hold
+        with self._writing:
+            print(json.dumps({"id": request["id"], **answer}), file=self._answers, flush=True)

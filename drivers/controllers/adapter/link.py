@@ -2,10 +2,13 @@
 
 import asyncio
 import logging
+import os
+import sys
 from asyncio.subprocess import PIPE, Process
 from collections import deque
 from collections.abc import Mapping
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, TypeVar
 
 from drivers import errors
@@ -53,7 +56,7 @@ class Link:
         Raises:
             ConnectionLost: it cannot be started, or nobody answers at its address.
         """
-        program = self._program
+        program, path = self._program, os.environ.get("PATH", os.defpath)
         try:
             if program.command:
                 # In a session of its own: Ctrl-C must not end it before it has stopped the robot.
@@ -64,6 +67,7 @@ class Link:
                     stderr=PIPE,
                     limit=messages.LONGEST_LINE,
                     start_new_session=True,
+                    env=os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{path}"},
                 )
                 reader, self._writer = self._process.stdout, self._process.stdin
                 if self._process.stderr is not None:
@@ -130,6 +134,8 @@ class Link:
                 with suppress(ProcessLookupError):
                     self._process.kill()
                 await self._process.wait()
+        if self._tasks:
+            await asyncio.wait(self._tasks, timeout=limit_s)  # until all that it wrote is read
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -145,7 +151,7 @@ class Link:
             raise self._break(await self._lost()) from error
 
     async def _read(self, reader: asyncio.StreamReader) -> None:
-        """Take each line until the first that is unexpected."""
+        """Take each line until the first that is unexpected, and read on without a use for the rest."""
         try:
             while line := await reader.readline():
                 self._record.add(TrafficDirection.RECEIVED, line)
@@ -161,6 +167,9 @@ class Link:
             self._break(await self._lost())
         else:
             self._break(await self._lost())
+        with suppress(OSError):
+            while await reader.read(messages.LONGEST_LINE):
+                pass
 
     def _take(self, line: bytes) -> None:
         message = messages.read_line(line)
@@ -178,11 +187,12 @@ class Link:
             answered.set_result(message.done)
 
     async def _read_printed(self, reader: asyncio.StreamReader) -> None:
-        with suppress(OSError, ValueError):
-            while line := await reader.readline():
-                text = printable(line[:SHOWN_SIGNS].decode("utf-8", "replace").strip())
-                self._printed.append(text)
-                _log.info("%s printed: %s", self._program.name, text)
+        with suppress(OSError):
+            while read := await reader.read(messages.LONGEST_LINE):
+                for line in read.splitlines()[-SHOWN_LINES:]:
+                    text = printable(line[:SHOWN_SIGNS].decode("utf-8", "replace").strip())
+                    self._printed.append(text)
+                    _log.info("%s printed: %s", self._program.name, text)
 
     async def _lost(self) -> DeviceError:
         """The program has ended, or its connection: what is known of it."""
@@ -201,7 +211,7 @@ class Link:
         return errors.WrongAnswer(problem, subject=self._program.name, action="Correct the program")
 
     def _break(self, error: DeviceError) -> DeviceError:
-        """Trust it no more: whoever waits gets the error, and the program sees the end and stops the robot."""
+        """Trust it no more: whoever waits gets the error, and the program, at its end, stops the robot."""
         self.broken = self.broken or error
         for answered in self._pending.values():
             if not answered.done():

@@ -30,9 +30,7 @@ class Robot:
     def hello(self, told):
         connection = socket.create_connection((told["host"], told.get("port", 5007)), timeout=3.0)
         self.lines = connection.makefile("rwb", buffering=0)
-        self.lines.write(
-            b"hello EMC adapter 1.0\r\nset echo off\r\nset verbose on\r\nset enable EMCTOO\r\n"
-        )
+        self.lines.write(b"hello EMC adapter 1\r\nset echo off\r\nset verbose on\r\nset enable EMCTOO\r\n")
         self.ask("set set_wait received")
         return {"version": 1, "length": "mm", "angle": "deg", "name": "LinuxCNC by its network shell"}
 
@@ -40,19 +38,17 @@ class Robot:
         verb, name = command.upper().split()[:2]
         with self.asking:
             self.lines.write(command.encode() + b"\r\n")
-            while (words := self.lines.readline().decode().split()) != [verb, name, "NAK"]:
-                if words[:1] == [name] or words == [verb, name, "ACK"]:
+            while (line := self.lines.readline().decode()) and line.split() != [verb, name, "NAK"]:
+                if (words := line.split())[:1] == [name] or words == [verb, name, "ACK"]:
                     return " ".join(words[1:])
-        raise Failed("fault", f"it refuses '{command}'")
+        raise Failed("fault", f"it refuses '{command}', or is gone")
 
     def numbers(self, what):
         return [float(word) for word in self.ask(f"get {what}").split()[:6]]
 
     def status(self, _=None):
         before = self.numbers("joint_pos")
-        found = {
-            key: not {"OFF", "NO"} & {*self.ask(f"get {what}").split()} for key, what in STATES.items()
-        }
+        found = {key: not {"OFF", "NO"} & {*self.ask(f"get {of}").split()} for key, of in STATES.items()}
         return found | {"moving": self.numbers("joint_pos") != before, "heartbeat": str(before)}
 
     def position(self, _):

@@ -256,8 +256,11 @@ class AdapterController:
         if not isinstance(answer, Failed):
             return answer
         if answer.kind == "interrupted":
-            problem = f"was interrupted: '{do}' ended early, {answer.reason}"
-            raise errors.MotionInterrupted(problem, subject=self._name, action=answer.action)
+            raise errors.MotionInterrupted(
+                f"was interrupted: '{do}' ended early, {answer.reason}",
+                subject=self._name,
+                action="Find out why, then prepare it again",
+            )
         raise errors.CommandRefused(f"'{do}'", answer.reason, subject=self._name, action=answer.action)
 
     async def _do(self, link: Link, do: str, limit_s: float) -> None:
@@ -312,7 +315,8 @@ class AdapterController:
         """Require that it is where it was before a reload."""
         found = await self._position(link)
         if found.pose is None:
-            raise DeviceError("is homed, and does not know where it is", subject=self._name)
+            action = "Home it again, or correct its program"
+            raise DeviceError("is homed, and does not know where it is", subject=self._name, action=action)
         before, joints = self._joints_before_reload, _joints(found)
         # With other zeros it reports other joints where it stands: encoders then show whether it moved.
         if before is not None and joints is not None and not self._settings.joints_include_zeros:
@@ -397,7 +401,7 @@ class AdapterController:
         raise errors.MotionInterrupted(
             f"stopped{where} before reaching {target}: {failed.reason}",
             subject=self._name,
-            action=failed.action or "Find out why it stopped, then prepare it and measure this pose again",
+            action="Find out why it stopped, then prepare it and measure this pose again",
         )
 
     async def _verify(self, link: Link, pose: Pose, stops: int) -> None:

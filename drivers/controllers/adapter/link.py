@@ -261,8 +261,11 @@ class Link:
             problem = self._masked(f"refuses to begin: {hello.reason}")
             raise DeviceError(problem, subject=name, action=hello.action)
         if hello.version != VERSION:
-            problem = f"has version {hello.version} of the adapter protocol, hexacell has {VERSION}"
-            raise DeviceError(problem, subject=name, action="Install versions that fit")
+            raise DeviceError(
+                f"has version {hello.version} of the adapter protocol, hexacell has {VERSION}",
+                subject=name,
+                action="Install versions of both that fit",
+            )
         for unit, own in ((hello.length, "mm"), (hello.angle, "deg")):
             if unit != own:
                 problem, action = f"counts in {unit!r}, not in {own}", f"Have its program convert to {own}"

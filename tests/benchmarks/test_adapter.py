@@ -36,7 +36,8 @@ def test_random_faults(tmp_path: Path, figure: Figures) -> None:
         (fault, at), nth, log = drawn.choice(EVERY), drawn.choice([1, 1, 2, 3]), tmp_path / str(seed)
         async with free:
             try:
-                named += await whole_job(driver(log, fault, at, nth), log) is not None
+                found = await whole_job(driver(log, fault, at, nth), log)
+                named += found is not None
             except Exception as error:  # whatever it is, it is no error of a device
                 unsafe.append(f"{fault} at {at} {nth}: {error!r}")
 

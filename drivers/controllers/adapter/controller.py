@@ -66,7 +66,7 @@ class AdapterController:
         self._linking, self._order, self._stopping = asyncio.Lock(), asyncio.Lock(), asyncio.Lock()
         self._stop_count = 0
         self._unready = "it was not prepared"
-        self._was_enabled = self._is_reloading = False
+        self._was_enabled = self._is_reloading = self._is_unstopped = False
         self._joints_before_reload: tuple[float, ...] | None = None
         self._here: Pose | None = None
 
@@ -113,8 +113,8 @@ class AdapterController:
         stops = self._stop_count
         async with self._order:
             link = self._connected()
-            if self._unready:
-                raise self._refused(pose, self._unready, "Prepare it again")
+            if self._unready or self._is_unstopped:
+                raise self._refused(pose, self._unready or "it could not be stopped", "Prepare it again")
             if self._stop_count != stops:
                 raise errors.MotionInterrupted("was stopped before it moved", subject=self._name)
             if not all(map(math.isfinite, (*pose.as_tuple(), duration_s))):
@@ -161,6 +161,7 @@ class AdapterController:
                 except errors.ConnectionLost:
                     await self._stop_over(await self._linked(self._timeouts.stop))
             except DeviceError as error:
+                self._is_unstopped = True
                 problem = f"could not be stopped: it {error.problem}"
                 raise DeviceError(problem, subject=self._name, action="Press the emergency stop") from error
 
@@ -297,7 +298,7 @@ class AdapterController:
             await self._do(link, _REQUESTS[action], limit_s)
             last = action
         await self._require_place(link)
-        self._unready, self._is_reloading = "", False
+        self._unready, self._is_reloading, self._is_unstopped = "", False, False
 
     async def _undisturbed(self, link: Link) -> Status:
         """Its status; raises ``DeviceError`` where somebody else commands it."""

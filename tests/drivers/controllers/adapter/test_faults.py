@@ -85,6 +85,12 @@ async def test_a_robot_that_moved_by_itself_does_not_move_before_it_is_prepared(
     assert "it moved without a command" in error.problem
 
 
+@pytest.mark.parametrize("fault", ["refused", "interrupted", "still moving", "silence"])
+async def test_a_stop_that_failed_once_is_not_forgotten(log: Path, fault: str) -> None:
+    error = await whole_job(driver(log, fault, "stop"), log)  # which tries to move afterwards
+    assert fault in {"still moving", "silence"} or "could not be stopped" in str(error)
+
+
 async def test_what_is_not_permitted_is_not_asked_for(log: Path) -> None:
     controller = driver(log)
     await controller.open()

@@ -109,7 +109,8 @@ def _with_includes_named(path: Path, inis: Sequence[Path]) -> IniText:
     text = read_text(path)
     for found in INCLUDE.finditer(text):
         if Path(found[1]).name not in {ini.name for ini in inis}:
-            line, action = text.count("\n", 0, found.start()) + 1, "Name it too: it may have the numbers"
+            line = text.count("\n", 0, found.start()) + 1
+            action = "Name it too: it may have the numbers"
             raise FileError(f"{found[1]} is included here", subject=path, line=line, action=action)
     return IniText(text, path, "")
 

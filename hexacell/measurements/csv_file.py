@@ -56,6 +56,11 @@ def read_measurements(path: Path, *, allow_partial: bool = False) -> Measurement
     text = read_text(path, LARGEST_FILE_BYTES)
     if allow_partial and not text.strip():
         return MeasurementSet(())
+    return measurements_in(path, text, allow_partial=allow_partial)
+
+
+def measurements_in(path: Path, text: str, *, allow_partial: bool = False) -> MeasurementSet:
+    """The records in the text of a measurement file; raises as ``read_measurements`` does."""
     records = _records(path, text, HEADER)
     if not allow_partial and not records:
         raise FileError("there are no measurements in it", subject=path, action="Measure some first")

@@ -44,11 +44,10 @@ else:
         "procedures.run.questions": "Question",
     }
     _MODULES = {name: room for room, names in _ROOMS.items() for name in names.split()}
-    __all__ = [*_MODULES]  # noqa: PLE0605 - a list
 
     def __dir__():  # noqa: ANN202 - not seen by type checkers, which see the imports above
         """What a notebook offers to complete."""
-        return __all__
+        return sorted(_MODULES)
 
     def __getattr__(name):  # noqa: ANN001, ANN202 - likewise
         """Import a name when it is first used: whoever fits records does not wait for the rest."""

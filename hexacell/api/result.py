@@ -116,11 +116,8 @@ class Result:
 
 def fit(cell: Cell, records: MeasurementSet) -> Result:
     """Identify the geometry from records alone; raises as :func:`fit_measurements`, and as good as that."""
-    assessed = fit_measurements(cell, records)
-    result, parameters = (
-        IdentificationResult.of(assessed.found, assessed.zeros),
-        cell.settings.mechanism.parameters,
-    )
+    assessed, parameters = fit_measurements(cell, records), cell.settings.mechanism.parameters
+    result = IdentificationResult.of(assessed.found, assessed.zeros)
     line, residuals = " ".join(findings(assessed)), RecordResidual.of_records(assessed.found)
     return Result(records, None, line, None, assessed, residuals, parameters.names, parameters, result)
 
@@ -128,15 +125,11 @@ def fit(cell: Cell, records: MeasurementSet) -> Result:
 def read_result(folder: Path | str) -> Result:
     """The result of a run by its folder; raises as :func:`reported_run`."""
     run = reported_run(Path(folder))
-    state, parameters, found = run.state, run.settings.mechanism.parameters, run.state.identified
-    line, result = (
-        state.ended.line if state.ended else "the run is not over",
-        found.result if found else None,
-    )
-    residuals, verdict = found.residuals if found else (), state.verdict and state.verdict.value
-    return Result(
-        state.measurements(), verdict, line, run, None, residuals, parameters.names, parameters, result
-    )
+    state, parameters = run.state, run.settings.mechanism.parameters
+    result, residuals = (one.result, one.residuals) if (one := state.identified) else (None, ())
+    line = state.ended.line if state.ended else "the run is not over"
+    known = (run, None, residuals, parameters.names, parameters, result)
+    return Result(state.measurements(), state.verdict and state.verdict.value, line, *known)
 
 
 def frame(of: MeasurementSet | Result) -> Any:  # noqa: ANN401 - pandas is no dependency

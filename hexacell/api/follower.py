@@ -3,7 +3,7 @@
 import asyncio
 import threading
 from collections.abc import AsyncGenerator, Callable, Coroutine
-from concurrent.futures import Future
+from concurrent.futures import CancelledError, Future
 from contextlib import aclosing, suppress
 from typing import Any, Generic, TypeVar
 
@@ -46,10 +46,10 @@ class Follower(Generic[Item]):
         return found
 
     def call(self, work: Coroutine[Any, Any, Value], within_s: float) -> Value:
-        """What some work in the thread gives; raises ``TimeoutError``, also where the thread has ended."""
+        """What some work in the thread gives; raises ``TimeoutError``, also where the thread ends."""
         try:
             return asyncio.run_coroutine_threadsafe(work, self._loop).result(within_s)
-        except RuntimeError as error:
+        except (RuntimeError, CancelledError) as error:
             work.close()
             raise TimeoutError(f"{self._thread.name} are over") from error
 

@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine, Generator
-from contextlib import aclosing
+from contextlib import aclosing, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from html import escape
@@ -13,7 +13,7 @@ from typing import Any, Self
 from hexacell.api.follower import Follower
 from hexacell.api.result import Result, read_result
 from hexacell.cell.loader import Cell
-from hexacell.errors import AnswerNeeded, FileError, UsageError
+from hexacell.errors import AnswerNeeded, FileError, HexacellError, UsageError
 from hexacell.measurements.records import MeasurementSet
 from hexacell.run_process import client
 from hexacell.run_process.messages import EventRecorded, HostFailed, HostMessage, LiveSnapshot
@@ -123,7 +123,8 @@ class Run:
 
     def leave(self, *, keep_running: bool) -> None:
         """Let it go on without anybody, or have it stopped in place."""
-        self._send(lambda connection: connection.leave(keep_running=keep_running))
+        with suppress(HexacellError):  # it ended meanwhile
+            self._send(lambda connection: connection.leave(keep_running=keep_running))
         self._follower.stop()
 
     def result(self) -> Result:
@@ -156,8 +157,7 @@ class Run:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if not self._follower.is_over:
-            self.leave(keep_running=False)
+        self.leave(keep_running=False)
 
     def _repr_html_(self) -> str:
         asked = "" if self.question is None else f"<pre>{escape(_asked(self.question, self.live))}</pre>"
@@ -188,8 +188,10 @@ class Run:
 
     def _next(self) -> tuple[RunEvent, ...] | None:
         """The next event; nothing at a good end, and None where it has not happened yet."""
-        if self._told:
-            return (self._told.popleft(),)
+        while self._told:
+            event = self._told.popleft()
+            if event.question in {None, self.question}:  # another has been answered
+                return (event,)
         return () if self._follower.is_over and self._follower.failure is None else None
 
     def _ended(self) -> Path | None:

@@ -16,14 +16,12 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import pytest
 
-from hexacell.cell.bundled import bundled_config
 from tests.cli.cell_folder import PATIENT, QUICK, copy_cell
 from tests.docs.pages import ROOT
 
 NOTEBOOK = json.loads((ROOT / "docs/notebook.ipynb").read_text(encoding="utf-8"))
 CELLS = ["".join(cell["source"]) for cell in NOTEBOOK["cells"] if cell["cell_type"] == "code"]
 FENCE = re.compile(r"^```python\n(.*?)^```$", flags=re.MULTILINE | re.DOTALL)
-SHOWN = ("_repr_html_", "_repr_svg_")
 
 
 async def value_of(cell: str, names: dict[str, Any]) -> Any:
@@ -91,5 +89,4 @@ def test_what_other_pages_name_is_there(page: str) -> None:
 
 
 def test_the_notebook_is_committed_without_outputs() -> None:
-    assert bundled_config("simulated-hexaglide").is_file()
     assert all(not cell.get("outputs") for cell in NOTEBOOK["cells"])

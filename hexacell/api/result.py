@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
 GAUGES = (("x", "o", BEFORE), ("y", "s", AFTER), ("z", "^", INK))
 HELD_OUT = (("as found", "o", BEFORE, Phase.BEFORE), ("as left", "s", AFTER, Phase.AFTER))
-OF_A_CALIBRATION = "Take the result of a calibration that is over"
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -87,7 +86,9 @@ class Result:
             name: () if self.run is None else self.run.state.held_out(p) for name, *_, p in HELD_OUT
         }
         if not any(held_out.values()):
-            raise UsageError("no held-out pose was measured", action=OF_A_CALIBRATION)
+            raise UsageError(
+                "no held-out pose was measured", action="Take the result of a calibration that is over"
+            )
         axes = axes or _new_axes("held-out pose", "distance of the ball, mm")
         for name, marker, colour, _ in HELD_OUT:
             sizes = [max(hypot(*one), SMALLEST_MM) for one in held_out[name]]
@@ -104,7 +105,9 @@ class Result:
     @property
     def _found(self) -> IdentificationResult:
         if self._identified is None:
-            raise UsageError("no geometry was identified", action=OF_A_CALIBRATION)
+            raise UsageError(
+                "no geometry was identified", action="Take the result of a calibration that is over"
+            )
         return self._identified
 
     def _rows(self, names: Sequence[str]) -> list[int]:

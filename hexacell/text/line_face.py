@@ -91,6 +91,10 @@ class EventFormatter:
                 forecast = wrapped(run_forecast_line(self._forecast), indent=2)
         return [text for text in (event_text(event, state), forecast) if text]
 
+    def story(self, event: events.Event, state: RunState) -> str:
+        """The same for whoever sees nothing else of the run: records and its end too."""
+        return "\n".join([*_own_words(event), *self.lines(event, state)])
+
     def status_text(self, expected: int) -> str:
         """Where the run is: what it does, how far it is, its last record, its accuracy and the time left.
 
@@ -156,9 +160,8 @@ def run_story(entries: Iterable[Entry]) -> Iterator[tuple[Entry, str]]:
     formatter, state = EventFormatter(), RunState()
     for entry in entries:
         state = apply(state, entry.event)
-        lines = [*_own_words(entry.event), *formatter.lines(entry.event, state)]
-        if lines:
-            yield entry, "\n".join(lines)
+        if text := formatter.story(entry.event, state):
+            yield entry, text
 
 
 def story_text(entries: Iterable[Entry]) -> str:

@@ -1,8 +1,6 @@
 """The nodes of a PLC: all read in one request, each value checked; written in the PLC's own types."""
 
-import asyncio
 import math
-import threading
 from collections.abc import Coroutine, Mapping, Sequence
 from concurrent.futures import CancelledError
 from itertools import islice
@@ -13,6 +11,7 @@ from typing import Any, TypeVar
 from asyncua import ua
 from asyncua.client.client import Client
 from asyncua.crypto import security_policies
+from asyncua.sync import ThreadLoop
 from asyncua.ua.attribute_ids import AttributeIds
 from asyncua.ua.uaerrors import UaError
 
@@ -52,8 +51,9 @@ class PlcNodes:
             n: [ua.NodeId.from_string(one) for one in ids] for n, ids in options.node_ids().items()
         }
         self._types: dict[str, list[ua.VariantType]] = {}
-        self._loop = asyncio.new_event_loop()
-        threading.Thread(target=self._loop.run_forever, daemon=True).start()
+        self._thread = ThreadLoop(None)
+        self._thread.daemon = True
+        self._thread.start()
 
     def connect(self) -> None:
         """Log in at the PLC's server; raises ``FailedError``, as all of these do."""
@@ -62,6 +62,7 @@ class PlcNodes:
     def close(self) -> None:
         """Log out, so that the PLC has this session for the next client."""
         self._do(self._client.disconnect())
+        self._thread.stop()
 
     def read(self) -> Values:
         """All of them now; it fails if one is not Good, not of its type or not finite."""
@@ -99,7 +100,7 @@ class PlcNodes:
 
     def _do(self, work: Coroutine[Any, Any, Result]) -> Result:
         try:
-            return asyncio.run_coroutine_threadsafe(work, self._loop).result()
+            return self._thread.post(work)
         except HexacellError as error:
             raise FailedError("fault", error.cause, action=error.action or "Correct it") from error
         except (OSError, TimeoutError, UaError, CancelledError) as error:

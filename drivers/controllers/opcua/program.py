@@ -37,26 +37,32 @@ ANSWERS = ("busy", "done", "error")
 class Plc:
     """A PLC as a robot that is served."""
 
-    def hello(self, settings: Told) -> Told:
-        """Connect, and see that nobody else commands this PLC."""
-        options = OpcUaOptions.model_validate_json(json.dumps(settings))
-        nodes = PlcNodes(options)
-        nodes.connect()
-        self._nodes = nodes
-        first = nodes.read()
-        time.sleep(2 * BEAT_S)
-        if nodes.read()["client_heartbeat"] != first["client_heartbeat"]:
-            reason = "another program commands this PLC: client_heartbeat counts"
-            raise FailedError("refused", reason, action="End it, and open the controller again")
+    def __init__(self) -> None:
         # The last two numbers and counts that were written: a read may be before or after the last.
         self._numbers = deque([random.randint(1, LARGEST)], maxlen=2)  # noqa: S311 - no secret
         self._counts = deque([0], maxlen=2)
         self._stops = self._stopping = 0
-        self._edges = threading.Lock()
-        self._heartbeat, self._heard_s, self._longest_s = None, time.monotonic(), options.heartbeat_s
-        nodes.write(execute=False, stop=False, number=self._numbers[-1], client_heartbeat=0)
+        self._edges, self._closing = threading.Lock(), threading.Event()
+        self._heartbeat: int | None = None
+        self._is_connected = False
+
+    def hello(self, settings: Told) -> Told:
+        """Connect, and see that nobody else commands this PLC."""
+        options = OpcUaOptions.model_validate_json(json.dumps(settings))
+        self._nodes = PlcNodes(options)
+        self._nodes.connect()
+        first = self._nodes.read()
+        time.sleep(2 * BEAT_S)
+        if self._nodes.read()["client_heartbeat"] != first["client_heartbeat"]:
+            reason = "another program commands this PLC: client_heartbeat counts"
+            raise FailedError("refused", reason, action="End it, and open the controller again")
+        self._heard_s, self._longest_s = time.monotonic(), options.heartbeat_s
+        self._counts.append(first["client_heartbeat"] % LARGEST + 1)
+        own = {"number": self._numbers[-1], "client_heartbeat": self._counts[-1]}
+        self._nodes.write(execute=False, stop=False, **own)
         self._beating = threading.Thread(target=self._beat, daemon=True)
         self._beating.start()
+        self._is_connected = True
         return {"name": options.endpoint, "description": "PLC with an OPC UA server"}
 
     def status(self) -> Told:
@@ -82,6 +88,8 @@ class Plc:
 
     def stop(self) -> None:
         """Stop the motion, and the command; where it does not come to rest, it stays told to stop."""
+        if not self._is_connected:
+            return
         beats: set[int] = set()
 
         def rests(seen: Values) -> bool:
@@ -100,7 +108,9 @@ class Plc:
 
     def close(self) -> None:
         """Log out."""
-        if hasattr(self, "_nodes"):
+        self._closing.set()
+        if self._is_connected:
+            self._beating.join()
             self._nodes.close()
 
     def _seen(self) -> Values:
@@ -119,12 +129,11 @@ class Plc:
 
     def _beat(self) -> None:
         with suppress(FailedError):
-            while True:
+            while not self._closing.wait(BEAT_S):
                 self._counts.append(self._counts[-1] % LARGEST + 1)
                 self._nodes.write(client_heartbeat=self._counts[-1])
                 with suppress(FailedError):  # to have heard of the PLC when somebody asks
                     self._seen()
-                time.sleep(BEAT_S)
 
     def _command(self, code: int, report: Report | None = None, **more: Any) -> None:  # noqa: ANN401
         """Have one command carried out; where it fails otherwise than refused, the robot is stopped."""

@@ -163,9 +163,7 @@ class PlcServer(Closeable):
         secure: dict[str, Any] = (
             {"security": "none"} if self._folder is None else {"folder": str(self._folder / "client")}
         )
-        return OpcUaOptions(
-            endpoint=f"opc.tcp://127.0.0.1:{self._server.bserver.port}/", node=pattern, **secure
-        )
+        return OpcUaOptions(endpoint=f"opc.tcp://127.0.0.1:{self._listener.port}/", node=pattern, **secure)
 
     def write(self, **values: Any) -> None:
         """Write inputs as another client does, or a restart of the PLC."""
@@ -180,10 +178,15 @@ class PlcServer(Closeable):
         self.write(**{name: ZEROS.get(NODES[name], [0.0] * 6) for name in INPUTS})
         self.set_unplugged(on=False)
 
+    def stand(self) -> None:
+        """As a PLC in STOP: the program stands, and its outputs are off."""
+        self.stands = True
+        self.machine.stop()
+
     def set_unplugged(self, *, on: bool) -> None:
         """Cut all connections and accept none, or accept them again; the program goes on."""
         with suppress(OSError):  # it accepts them already
-            self._do(self._server.bserver.stop() if on else self._server.bserver.start())
+            self._do(self._listener.stop() if on else self._listener.start())
 
     def set_silent(self, *, on: bool) -> None:
         """Answer nothing, or answer again; the program goes on."""
@@ -228,6 +231,8 @@ class PlcServer(Closeable):
             if name not in INPUTS:
                 self._server.set_attribute_value_callback(node.nodeid, self._shown(name))
         await self._server.start()
+        assert self._server.bserver is not None
+        self._listener = self._server.bserver
 
     def _shown(self, name: str) -> Callable[..., ua.DataValue]:
         return lambda *_: self.forced.get(name) or self._data(name, self.program.outputs[name])

@@ -137,9 +137,10 @@ class Plc:
 
     def _command(self, code: int, report: Report | None = None, **more: Any) -> None:  # noqa: ANN401
         """Have one command carried out; where it fails otherwise than refused, the robot is stopped."""
-        before = self._seen()
-        if self._stopping or any(before[name] for name in (*ANSWERS, "moving")):
-            raise FailedError("refused", f"the PLC is busy, with command {before['answered']} or a motion")
+        self._until(
+            lambda seen: not (self._stopping or any(map(seen.get, (*ANSWERS, "moving")))),
+            "is busy with another command, or moves",
+        )
         stops = self._stops
         self._numbers.append(self._numbers[-1] % LARGEST + 1)
         written = {"command": code, "number": self._numbers[-1], "stop": False, **more}

@@ -170,10 +170,11 @@ class PlcServer(Closeable):
         for name, value in values.items():
             self._do(self._server.write_attribute_value(self._id(name), self._data(name, value)))
 
-    def restart(self) -> None:
-        """As after a loss of power: all that was written is lost, and it is in emergency stop."""
+    def restart(self, machine: Machine | None = None) -> None:
+        """As after a loss of power, perhaps at another machine: all that was written is lost."""
         self.set_unplugged(on=True)
         self.program.close()
+        self.machine = machine or self.machine
         self.program = PlcProgram(self.machine)
         self.write(**{name: ZEROS.get(NODES[name], [0.0] * 6) for name in INPUTS})
         self.set_unplugged(on=False)

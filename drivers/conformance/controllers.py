@@ -5,7 +5,7 @@ from abc import abstractmethod
 from typing import Protocol
 
 from drivers.conformance.suite import FAULTS, Suite, against_twin, failure, require_named
-from drivers.controllers.linuxcnc.protocol import pose_difference
+from drivers.controllers.poses import pose_difference
 from drivers.errors import MotionInterrupted, MoveRefused, StartupNotPermitted
 from drivers.interfaces import Controller, StartupAction
 from hexacell.cell.robot import ControllerSettings

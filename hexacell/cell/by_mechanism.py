@@ -13,7 +13,7 @@ from copy import copy
 from functools import cache
 from typing import Any, TypeVar
 
-from pydantic import Field, create_model
+from pydantic import Field, ValidationError, create_model
 from pydantic_core import PydanticUndefined
 
 from hexacell.cell.devices import EncoderSettings, LinearEncoderSettings, RotaryEncoderSettings
@@ -124,8 +124,10 @@ def cell_model(
 def _options_field(options: type[ControllerOptions]) -> tuple[type[ControllerOptions], Any]:
     """A key of the controller's section, which may be left away if all options may."""
     field = copy(ControllerSettings.model_fields["options"])
-    needed = any(one.is_required() for one in options.model_fields.values())
-    field.default = PydanticUndefined if needed else options()
+    try:
+        field.default = options()
+    except ValidationError:  # some are needed
+        field.default = PydanticUndefined
     return options, field
 
 

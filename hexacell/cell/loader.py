@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from pydantic import SecretStr, ValidationError
-from pydantic.json_schema import models_json_schema
 
 from hexacell.cell.by_mechanism import cell_model
 from hexacell.cell.diagnostics import Diagnosis
@@ -168,6 +167,8 @@ def settings_document(cell: Cell) -> dict[str, Any]:
 
 def schema() -> dict[str, Any]:
     """The JSON Schema of a cell file, for editors and other programs, with each controller's options."""
+    from pydantic.json_schema import models_json_schema  # noqa: PLC0415 - only for this
+
     found = cell_model(DEFAULT_MECHANISM, encoder_scales=False).model_json_schema()
     each = dict.fromkeys(controller_options(one) for one in names(Group.CONTROLLERS))
     refs, definitions = models_json_schema([(one, "validation") for one in each])

@@ -11,7 +11,7 @@ from hexacell.dry_run.campaign import VisitedPose
 from hexacell.errors import UsageError
 from hexacell.run_process.client import RunConnection, connect_to_run, start_host
 from hexacell.run_process.live_devices import watch_devices
-from hexacell.run_process.messages import LiveSnapshot
+from hexacell.run_process.live_snapshot import LiveSnapshot
 from hexacell.run_process.recorded import RecordedRun
 from hexacell.run_process.run_socket import socket_path
 from hexacell.runs.run_folder import find_run, new_run

@@ -25,7 +25,7 @@ from procedures.steps import events
 from procedures.steps.move import Move
 
 if TYPE_CHECKING:
-    from hexacell.run_process.messages import GaugeSnapshot, LiveSnapshot
+    from hexacell.run_process.live_snapshot import GaugeSnapshot, LiveSnapshot
 
 INDENT = 10
 """Width of the column with the time."""

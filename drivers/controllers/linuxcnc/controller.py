@@ -9,6 +9,8 @@ from drivers import errors, interfaces
 from drivers.controllers.linuxcnc import protocol, startup
 from drivers.controllers.linuxcnc.commands import ControllerCommands
 from drivers.controllers.linuxcnc.session import Session
+from drivers.controllers.poses import pose_difference, require_unmoved
+from drivers.controllers.reload_command import run_reload_command
 from drivers.wire_trace import TraceRecorder
 from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError
@@ -161,7 +163,7 @@ class LinuxcncrshController:
                     self._joints_before_reload = await commands.joints()
                 await startup.switch_machine(commands, self._timeouts, on=False)
                 if command := self._settings.reload_command:
-                    await startup.run_reload_command(command, self._name, self._timeouts.reload)
+                    await run_reload_command(command, self._name, self._timeouts.reload)
                 await self._make_ready(await self._session.reconnect(), permitted, stops)
 
     async def close(self) -> None:
@@ -199,7 +201,12 @@ class LinuxcncrshController:
         if self._joints_before_reload is not None:
             # With other zeros it reports other joints where it stands: encoders then show whether it moved.
             if not self._settings.joints_include_zeros:
-                self._require_unmoved(self._joints_before_reload, await commands.joints())
+                require_unmoved(
+                    self._joints_before_reload,
+                    await commands.joints(),
+                    self._settings.position_tolerance_mm,
+                    self._name,
+                )
             self._joints_before_reload = None
         await startup.enter_mdi_mode(commands, self._timeouts)
 
@@ -272,19 +279,9 @@ class LinuxcncrshController:
             await asyncio.sleep(self._timeouts.poll)
 
     def _agree(self, one: Pose, other: Pose) -> bool:
-        position, angle = protocol.pose_difference(one, other)
+        position, angle = pose_difference(one, other)
         settings = self._settings
         return position <= settings.position_tolerance_mm and angle <= settings.angle_tolerance_deg
 
     def _was_stopped_since(self, stops: int) -> bool:
         return self._session.stop_count != stops
-
-    def _require_unmoved(self, before: tuple[float, ...], after: tuple[float, ...]) -> None:
-        moved = [abs(new - old) for new, old in zip(after, before, strict=True)]
-        if max(moved) > self._settings.position_tolerance_mm:
-            joint = moved.index(max(moved)) + 1
-            raise DeviceError(
-                f"moved joint {joint} by {max(moved):.3f} mm while it read its config again",
-                subject=self._name,
-                action="Check the machine and its config before it moves again",
-            )

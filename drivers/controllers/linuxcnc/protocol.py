@@ -201,10 +201,3 @@ def parse_number(text: str) -> float:
         return float(text.split(maxsplit=1)[0])
     except (IndexError, ValueError):
         return math.nan
-
-
-def pose_difference(one: Pose, other: Pose) -> tuple[float, float]:
-    """The largest difference of a position, mm, and of an angle, deg, less full turns."""
-    differences = [a - b for a, b in zip(one.as_tuple(), other.as_tuple(), strict=True)]
-    angles = [math.remainder(difference, 360.0) for difference in differences[3:]]
-    return max(map(abs, differences[:3])), max(map(abs, angles))

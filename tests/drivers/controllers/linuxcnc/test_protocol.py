@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivers.controllers import poses
 from drivers.controllers.linuxcnc import protocol
 from hexacell.errors import UsageError
 from hexacell.kinematics.pose import Pose
@@ -119,4 +120,4 @@ def test_positions_are_six_finite_numbers_or_refused(text):
 
 def test_the_pose_difference_ignores_full_turns_and_gives_the_largest_components():
     one, other = Pose(1, 2, 3, 180.0, 0.1, 0), Pose(1, 2.5, 2, -180.0, -0.2, 0)
-    assert protocol.pose_difference(one, other) == pytest.approx((1.0, 0.3))
+    assert poses.pose_difference(one, other) == pytest.approx((1.0, 0.3))

@@ -14,7 +14,7 @@ from drivers.controllers.adapter.served_robot import FailedError, Report, Told, 
 from drivers.controllers.opcua.nodes import PlcNodes, Values, fault, same
 from drivers.controllers.opcua.options import OpcUaOptions
 
-ANSWER_S = 4.0
+ANSWER_S = 3.0
 """Longest wait until a PLC takes a command over, resets its answer, or rests after a stop."""
 POLL_S, BEAT_S, REPORT_S = 0.01, 0.2, 0.2
 """Pauses between two reads while something is waited for, two counts, two reports of a place."""

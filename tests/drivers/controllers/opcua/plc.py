@@ -9,7 +9,6 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import suppress
 from dataclasses import astuple
 from pathlib import Path
 from typing import Any
@@ -33,6 +32,7 @@ TYPES = {Kind.SWITCH: VT.Boolean, Kind.INTEGER: VT.Int16, Kind.TEXT: VT.String}
 ZEROS: dict[Kind, Any] = {Kind.SWITCH: False, Kind.INTEGER: 0, Kind.REAL: 0.0, Kind.TEXT: ""}
 INPUTS = ("command", "number", "target", "duration", "execute", "stop", "client_heartbeat")
 URI = "urn:plc:server"
+CONNECTIONS = 10
 
 
 class PlcProgram:
@@ -186,8 +186,15 @@ class PlcServer(Closeable):
 
     def set_unplugged(self, *, on: bool) -> None:
         """Cut all connections and accept none, or accept them again; the program goes on."""
-        with suppress(OSError):  # it accepts them already
-            self._do(self._listener.stop() if on else self._listener.start())
+        self._server.iserver.max_connections = 0 if on else CONNECTIONS
+
+        async def cut() -> None:
+            for client in tuple(self._listener.clients):
+                if client.transport is not None:
+                    client.transport.close()
+
+        if on:
+            self._do(cut())
 
     def set_silent(self, *, on: bool) -> None:
         """Answer nothing, or answer again; the program goes on."""

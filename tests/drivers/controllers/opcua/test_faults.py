@@ -34,9 +34,11 @@ def address_space() -> Iterator[PlcServer]:
 
 
 @pytest.fixture
-def server(address_space: PlcServer) -> PlcServer:
+def server(address_space: PlcServer) -> Iterator[PlcServer]:
     address_space.restart(MachineInTime())
-    return address_space
+    yield address_space
+    repair(address_space)
+    address_space.program.close()
 
 
 @contextmanager

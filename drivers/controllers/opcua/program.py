@@ -54,6 +54,7 @@ class Plc:
         first = self._nodes.read()
         time.sleep(2 * BEAT_S)
         if self._nodes.read()["client_heartbeat"] != first["client_heartbeat"]:
+            self._nodes.close()
             reason = "another program commands this PLC: client_heartbeat counts"
             raise FailedError("refused", reason, action="End it, and open the controller again")
         self._heard_s, self._longest_s = time.monotonic(), options.heartbeat_s

@@ -9,7 +9,6 @@ import pytest
 from drivers.controllers.adapter.served_robot import FailedError
 from drivers.controllers.opcua import nodes, program
 from drivers.controllers.opcua.program import Plc
-from tests.drivers.conformance.test_encoders import MachineInTime
 from tests.drivers.controllers.opcua.faults import FAULTS, PlcFault, repair
 from tests.drivers.controllers.opcua.plc import PlcServer
 from tests.waiting import wait_until
@@ -24,21 +23,6 @@ FAR, NEAR = [0.0, 0.0, 500.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0, 5.0]
 def _impatience(monkeypatch) -> None:
     monkeypatch.setattr(program, "ANSWER_S", 1.0)
     monkeypatch.setattr(nodes, "REQUEST_S", 1.0)
-
-
-@pytest.fixture(scope="module")
-def address_space() -> Iterator[PlcServer]:
-    """Made once, as it takes more than a second."""
-    with PlcServer(MachineInTime()) as running:
-        yield running
-
-
-@pytest.fixture
-def server(address_space: PlcServer) -> Iterator[PlcServer]:
-    address_space.restart(MachineInTime())
-    yield address_space
-    repair(address_space)
-    address_space.program.close()
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from abc import abstractmethod
 from typing import Protocol
 
 from drivers.conformance.suite import FAULTS, Suite, against_twin, failure, require_named
-from drivers.controllers.poses import pose_difference
+from drivers.controllers.poses import agree
 from drivers.errors import MotionInterrupted, MoveRefused, StartupNotPermitted
 from drivers.interfaces import Controller, StartupAction
 from hexacell.cell.robot import ControllerSettings
@@ -144,9 +144,7 @@ class ControllerConformance(Suite[Controller, ControllerTwin]):
         return reported.pose
 
     async def _is_at(self, controller: Controller, twin: ControllerTwin, pose: Pose) -> bool:
-        millimetres, degrees = pose_difference(await self._pose(controller), pose)
-        settings = twin.settings
-        return millimetres <= settings.position_tolerance_mm and degrees <= settings.angle_tolerance_deg
+        return agree(await self._pose(controller), pose, twin.settings)
 
     async def _begun(self, controller: Controller, twin: ControllerTwin) -> asyncio.Task[None]:
         """A slow move; it is on its way if the controller has a heartbeat that shows it."""

@@ -2,6 +2,7 @@
 
 import math
 
+from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
 
@@ -11,6 +12,12 @@ def pose_difference(one: Pose, other: Pose) -> tuple[float, float]:
     differences = [a - b for a, b in zip(one.as_tuple(), other.as_tuple(), strict=True)]
     angles = [math.remainder(difference, 360.0) for difference in differences[3:]]
     return max(map(abs, differences[:3])), max(map(abs, angles))
+
+
+def agree(one: Pose, other: Pose, settings: ControllerSettings) -> bool:
+    """Whether two poses are the same within the tolerances of the cell file."""
+    position, angle = pose_difference(one, other)
+    return position <= settings.position_tolerance_mm and angle <= settings.angle_tolerance_deg
 
 
 def require_unmoved(

@@ -12,10 +12,14 @@ from hexacell.storage.atomic_files import read_end
 _SHOWN_CHARACTERS = 400
 
 
+def path_with_own_programs() -> str:
+    """Where programs are looked for: those that were installed together with this one, too."""
+    return os.pathsep.join((os.environ.get("PATH", os.defpath), str(Path(sys.executable).parent)))
+
+
 async def run_reload_command(command: tuple[str, ...], subject: str, timeout_s: float) -> None:
     """Run the command that makes a controller reload its config to its end; kill it on cancellation.
 
-    Programs that were installed together with this one are found wherever it was started from.
     Its output goes to a file, not to a pipe: a daemon that it starts would hold a pipe open for ever.
 
     Raises:
@@ -29,7 +33,6 @@ async def run_reload_command(command: tuple[str, ...], subject: str, timeout_s: 
             action="Correct controller.reload_command; the machine is off",
         )
 
-    path = os.pathsep.join((os.environ.get("PATH", os.defpath), str(Path(sys.executable).parent)))
     with tempfile.TemporaryFile() as output:
         try:
             process = await asyncio.create_subprocess_exec(
@@ -37,7 +40,7 @@ async def run_reload_command(command: tuple[str, ...], subject: str, timeout_s: 
                 stdin=asyncio.subprocess.DEVNULL,
                 stdout=output,
                 stderr=output,
-                env=os.environ | {"PATH": path},
+                env=os.environ | {"PATH": path_with_own_programs()},
             )
         except OSError as error:
             raise failure(f"cannot be run: {error.strerror or error}") from error

@@ -1,50 +1,43 @@
-"""A controller behind a program of any language, by the adapter protocol (docs/controller-adapter.md)."""
+"""A controller that a program serves by the adapter protocol (docs/controller-adapter.md)."""
 
 import asyncio
+import logging
 import math
 from contextlib import suppress
-from dataclasses import dataclass
-from typing import cast
+from typing import TypeVar, cast
 
 from drivers import errors, interfaces
-from drivers.controllers.adapter import messages
-from drivers.controllers.adapter.link import ACTION, AnswerType, Link, RequestFailed
+from drivers.controllers.adapter.link import Link, Timeouts
+from drivers.controllers.adapter.messages import Failed, Nothing, Position, Status, pose_of
 from drivers.controllers.adapter.options import AdapterOptions, Program
-from drivers.controllers.poses import pose_difference, require_unmoved
+from drivers.controllers.poses import agree, require_unmoved
 from drivers.controllers.reload_command import run_reload_command
+from drivers.interfaces import StartupAction
 from drivers.wire_trace import TraceRecorder
 from hexacell.cell.robot import ControllerSettings
-from hexacell.errors import DeviceError
+from hexacell.errors import DeviceError, UsageError
 from hexacell.kinematics.pose import Pose
 
-Action = interfaces.StartupAction
+_log = logging.getLogger("drivers.controllers.adapter")
 
-
-@dataclass(frozen=True, slots=True)
-class Timeouts:
-    """Longest waits, s of real time. A move may take twice its duration and ``beyond_move``."""
-
-    connect: float = 10.0
-    answer: float = 5.0
-    command: float = 20.0
-    arrival: float = 1.0
-    poll: float = 0.02
-    reload: float = 120.0
-    beyond_move: float = 10.0
-    closing: float = 5.0
-
+AnswerT = TypeVar("AnswerT")
 
 _TIMEOUTS = Timeouts()
-LEFT_TOLERANCES = 10.0
-"""A robot that nobody commands may move by so many tolerances of an arrival before the next move."""
+_REQUESTS = {
+    StartupAction.RESET_INITIAL_ESTOP: "reset-estop",
+    StartupAction.RESET_ESTOP: "reset-estop",
+    StartupAction.SWITCH_ON: "switch-on",
+    StartupAction.HOME: "home",
+}
+_ASIDE_MM, _ASIDE_SHARE = 5.0, 0.05
+"""How much longer than a straight move the way over a pose on it may be, also as a share of it."""
 
 
 class AdapterController:
-    """``drivers.interfaces.Controller`` behind a program.
+    """``drivers.interfaces.Controller`` by a program that is trusted in nothing.
 
-    Orders run one after another; ``stop``, ``status``, ``position`` and ``close`` do not wait for them. The
-    next one replaces a broken connection. After anything that is not understood the robot is stopped, and
-    nothing moves before it was prepared again.
+    Orders run one after another; ``stop``, ``status``, ``position`` and ``close`` do not wait for them.
+    After a failure nothing moves before it was prepared again, which also replaces a link that broke.
     """
 
     Options = AdapterOptions
@@ -57,341 +50,388 @@ class AdapterController:
         trace: TraceRecorder | None = None,
         timeouts: Timeouts = _TIMEOUTS,
     ) -> None:
-        self._settings, self._trace, self._timeouts = settings, trace, timeouts
         self._program = program or cast("AdapterOptions", settings.options).program
         self._name = self._program.name
+        if settings.unit_mm != 1.0:
+            raise UsageError("the adapter counts in mm", action="Remove controller.unit_mm")
+        self._settings, self._timeouts, self._trace = settings, timeouts, trace
+        port = settings.port
+        self._told: dict[str, object] = {"host": settings.host, **({} if port is None else {"port": port})}
+        self._is_open = False
         self._link: Link | None = None
-        self._hello: messages.Hello | None = None
-        self._connecting, self._order = asyncio.Lock(), asyncio.Lock()
-        self._stops = 0
-        self._is_unready = True
-        self._was_enabled = False
-        self._left_at: Pose | None = None
+        self._identity: interfaces.DeviceIdentity | None = None
+        self._linking, self._order, self._stopping = asyncio.Lock(), asyncio.Lock(), asyncio.Lock()
+        self._stop_count = 0
+        self._unready = "it was not prepared"
+        self._was_enabled = self._is_reloading = False
         self._joints_before_reload: tuple[float, ...] | None = None
+        self._here: Pose | None = None
 
     async def open(self) -> interfaces.DeviceIdentity:
-        """Start the program or connect to it, and ask who it is; nothing moves.
+        """Start the program, or connect to it; nothing moves.
 
         Raises:
-            DeviceError: there is none, or it does not speak this protocol.
+            DeviceError: it is not there, ends, does not answer, or not as the protocol has it.
         """
         async with self._order:
-            await self._connected()
-            assert self._hello is not None  # noqa: S101 - it is connected
-            said = self._hello
-            return interfaces.DeviceIdentity(
-                name=self._name,
-                protocol=self._program.protocol,
-                description=", ".join(filter(None, (said.name, said.description))),
-                serial_number=said.serial_number,
-            )
+            was_open, self._is_open = self._is_open, True
+            try:
+                await self._linked(self._timeouts.connect)
+            except BaseException:
+                self._is_open = was_open
+                raise
+            assert self._identity is not None  # noqa: S101 - of the link
+            return self._identity
 
     async def prepare(self, permitted: interfaces.StartupActions) -> None:
-        """Leave emergency stop, switch on, home, as far as it is permitted. May move the machine.
+        """Leave emergency stop, switch on, home, as far as it is permitted. May move the robot.
 
         Raises:
             StartupNotPermitted: it needs one of these that is not permitted.
             MotionInterrupted: ``stop`` was called during it.
-            DeviceError: an action has no effect, or it takes no commands from here.
+            DeviceError: a step fails or has no effect, or it takes no commands from here.
         """
-        stops = self._stops
+        stops = self._stop_count
         async with self._order:
-            self._is_unready = True
-            await self._make_ready(permitted, stops)
+            self._unready = "its last preparation failed"
+            await self._make_ready(await self._linked(self._timeouts.connect), permitted, stops)
 
     async def move(self, pose: Pose, duration_s: float) -> None:
-        """Move to a pose; returns when it reports that pose, at rest.
+        """Move to ``pose`` in no less than ``duration_s``; returns when the robot rests there.
 
         On cancellation, and if it takes more than twice as long and some seconds, the robot is stopped.
 
         Raises:
             PoseRefused: the pose is out of reach or limits.
-            MoveRefused: it is not prepared, or refuses to move now.
-            MotionInterrupted: it stopped at another pose, which the message names.
-            DeviceError: the program failed, or does not do what it says.
+            MoveRefused: the controller is not prepared, or refuses.
+            MotionInterrupted: the motion ended before its target.
+            DeviceError: the link broke, or the robot could not be stopped.
         """
-        stops = self._stops
-        if not all(math.isfinite(value) for value in (*pose.as_tuple(), duration_s)):
-            raise errors.MoveRefused(
-                f"to move to {pose}", "a coordinate is not a finite number", subject=self._name
-            )
-        limit_s = 2.0 * duration_s + self._timeouts.beyond_move
+        stops = self._stop_count
         async with self._order:
-            if self._is_unready or self._link is None or self._link.broken is not None:
-                reason = "it was not prepared since its last failure"
-                raise errors.MoveRefused(
-                    f"to move to {pose}", reason, subject=self._name, action="Prepare it again"
-                )
-            await self._require_left_alone()
-            if self._stops != stops:
+            link = self._connected()
+            if self._unready:
+                raise self._refused(pose, self._unready, "Prepare it again")
+            if self._stop_count != stops:
                 raise errors.MotionInterrupted("was stopped before it moved", subject=self._name)
-            self._left_at, self._is_unready = None, True
-            try:
-                await self._commanded(
-                    "move",
-                    limit_s,
-                    pose=pose.as_tuple(),
-                    duration_s=duration_s,
-                    refuses=f"to move to {pose}",
-                )
-                await self._require_arrival(pose)
-            except (errors.MoveRefused, asyncio.CancelledError):
-                self._is_unready = False  # it is at rest, and takes other poses
-                raise
-            except DeviceError:
-                if self._stops != stops:  # somebody wanted it
-                    self._is_unready = False
-                else:
-                    await self._stop_after_failure()
-                raise
-            self._is_unready = False
+            if not all(map(math.isfinite, (*pose.as_tuple(), duration_s))):
+                raise self._refused(pose, "a coordinate is not a finite number")
+            self._unready = "its last move failed"
+            await self._carry_out(link, pose, duration_s, stops)
+            self._unready, self._here = "", pose
 
     async def position(self) -> interfaces.ReportedPosition | None:
-        """Pose and joints, also during ``move``; None before it knows them."""
-        found = await self._asked("position", messages.Position)
+        """Pose and joints, also during ``move``; None where it does not know them."""
+        found = await self._position(self._connected())
         if found.pose is None:
             return None
-        return interfaces.ReportedPosition(Pose(*found.pose), found.joints)
+        return interfaces.ReportedPosition(pose_of(found.pose), _joints(found))
 
     async def joints_now(self) -> tuple[float, ...] | None:
-        """The six joints, also during ``move``; None before they are known."""
-        return (await self._asked("position", messages.Position)).joints
+        """The six joints, also during ``move``; None where it does not know them."""
+        return _joints(await self._position(self._connected()))
 
     async def status(self) -> interfaces.ControllerStatus:
-        """Emergency stop, enabled, and error messages; also during ``move``."""
-        found = await self._status()
-        said = found.errors if found.remote else ("it takes no commands from here", *found.errors)
-        return interfaces.ControllerStatus(
-            found.estop, found.enabled and found.remote, tuple(said), found.heartbeat
-        )
+        """Emergency stop, enabled, and what is wrong if it cannot move; also during ``move``."""
+        status = await self._status(self._connected())
+        may_move = status.enabled and not status.estop
+        told = () if may_move else tuple(status.errors)
+        if not status.remote:
+            told = ("it takes no commands from here", *told)
+        is_ours = status.enabled and status.remote
+        return interfaces.ControllerStatus(status.estop, is_ours, told, status.heartbeat)
 
     async def stop(self) -> None:
-        """Stop the motion in place; returns at standstill.
+        """Stop the motion in place; returns at rest. Orders that are still waiting are not executed.
+
+        Where the link is broken or breaks, another one is opened for it.
 
         Raises:
             DeviceError: the robot could not be stopped, or that is unknown.
         """
-        self._stops += 1
-        try:
-            await self._asked("stop", messages.Nothing)
-            is_moving = (await self._status()).moving
-        except errors.ConnectionLost:  # perhaps the program hangs: another one may stop the robot
-            await self._asked("stop", messages.Nothing)
-            is_moving = (await self._status()).moving
-        if is_moving:
-            raise DeviceError(
-                "says that it has stopped, and moves", subject=self._name, action="Press its emergency stop"
-            )
+        self._stop_count += 1
+        _log.info("%s: stop", self._name)
+        async with self._stopping:
+            try:
+                try:
+                    await self._stop_over(self._connected())
+                except errors.ConnectionLost:
+                    await self._stop_over(await self._linked(self._timeouts.stop))
+            except DeviceError as error:
+                problem = f"could not be stopped: it {error.problem}"
+                raise DeviceError(problem, subject=self._name, action="Press the emergency stop") from error
 
     async def reload(self, permitted: interfaces.StartupActions) -> None:
-        """Reload its config while it is switched off; joints must not move.
+        """Have it read its geometry again while it is switched off; joints must not move.
 
         Raises:
             StartupNotPermitted: it needs more than to be switched on again.
-            DeviceError: the reload failed, it does not come back, or a joint moved.
+            DeviceError: it fails, does not come back, or a joint moved.
         """
-        stops = self._stops
+        stops = self._stop_count
         async with self._order:
-            self._is_unready = True
-            self._left_at = None
-            if (await self._status()).enabled:
-                self._joints_before_reload = await self.joints_now()
-                await self._commanded("switch-off", self._timeouts.command)
+            link = self._connected()
+            self._unready = "its last reload failed"
+            status = await self._status(link)
+            if status.enabled and not status.estop:
+                self._joints_before_reload = _joints(await self._position(link))
+                await self._do(link, "switch-off", self._timeouts.command)
+                self._is_reloading = True
             if command := self._settings.reload_command:
                 await run_reload_command(command, self._name, self._timeouts.reload)
-                await self._disconnect()  # the controller may have been restarted
+                link.fail("was started anew")
+                link = await self._reconnected()
             else:
-                await self._commanded("reload", self._timeouts.reload)
-            await self._make_ready(permitted, stops)
+                await self._do(link, "reload", self._timeouts.reload)
+            await self._make_ready(link, permitted, stops)
 
     async def close(self) -> None:
-        """End the connection, and the program, which stops the robot; closing twice is harmless."""
-        await self._disconnect()
+        """End the program, or the connection to it; closing twice is harmless."""
+        self._is_open, self._identity = False, None
+        link, self._link = self._link, None
+        if link is not None:
+            await link.close()
 
-    async def _make_ready(self, permitted: interfaces.StartupActions, stops: int) -> None:
-        """Do what it needs and is permitted; ``_is_unready`` until all of it is done."""
-        if self._joints_before_reload is not None:  # then it was on, and this driver switched it off
-            permitted |= {Action.SWITCH_ON}
-        done = set[Action]()
-        while (action := self._next_action(await self._status())) is not None:
-            if action in done:
-                raise DeviceError(
-                    f"says that it has done '{_WORDS[action]}', which had no effect",
-                    subject=self._name,
-                    action="Look for a message on the controller's own screen",
+    async def _linked(self, hello_s: float) -> Link:
+        """The link; another one in place of one that broke, after which it must be prepared."""
+        async with self._linking:
+            self._require_open()
+            if self._link is None or self._link.is_broken:
+                if self._link is not None:
+                    await self._link.close()
+                self._unready = self._unready or "its connection was lost"
+                self._link = await Link.open(
+                    self._program, self._timeouts, self._trace, hello_s, **self._told
                 )
-            if action not in permitted:
-                raise errors.StartupNotPermitted(action, self._name)
-            if self._stops != stops:
-                raise errors.MotionInterrupted("was stopped before it was ready", subject=self._name)
-            if action is not Action.SWITCH_ON:
-                self._joints_before_reload = None  # somebody else switched it off, or the joints may move
-            homing_s = self._settings.homing_timeout_s
-            await self._commanded(
-                _WORDS[action], homing_s if action is Action.HOME else self._timeouts.command
-            )
-            done.add(action)
-        before, self._joints_before_reload = self._joints_before_reload, None
-        # With other zeros it reports other joints where it stands: encoders then show whether it moved.
-        if before is not None and not self._settings.joints_include_zeros:
-            after = await self.joints_now()
-            if after is not None:
-                require_unmoved(before, after, self._settings.position_tolerance_mm, self._name)
-        self._left_at = None
-        self._is_unready = False
+                said = self._link.hello
+                identity = interfaces.DeviceIdentity(
+                    name=self._name,
+                    protocol=self._program.protocol,
+                    description=", ".join(filter(None, (said.name, said.description))),
+                    serial_number=said.serial_number,
+                )
+                if not self._is_open or identity != (self._identity or identity):
+                    self._link.fail(f"is another one now: {identity.description}")
+                    self._require_open()
+                self._identity = self._identity or identity
+            self._link.require_sound()
+            return self._link
 
-    def _next_action(self, status: messages.Status) -> Action | None:
-        if not status.remote:
-            raise DeviceError(
-                "takes no commands from here", subject=self._name, action="Switch it to remote control"
-            )
-        if status.moving:
-            raise DeviceError(
-                "moves, and nobody here has commanded it", subject=self._name, action="Wait until it rests"
-            )
-        if status.estop:
-            return Action.RESET_ESTOP if self._was_enabled else Action.RESET_INITIAL_ESTOP
-        if not status.enabled:
-            return Action.SWITCH_ON
-        self._was_enabled = True
-        return None if status.homed else Action.HOME
-
-    async def _require_left_alone(self) -> None:
-        """Refuse to move a robot that is not where the last move has left it."""
-        if self._left_at is None:
-            return
-        here = await self.position()
-        if here is None or not self._agree(here.pose, self._left_at, LEFT_TOLERANCES):
-            self._is_unready = True
-            where = "nowhere" if here is None else f"at {here.pose}"
-            raise errors.MotionInterrupted(
-                f"is {where}, and was left at {self._left_at}: it moved without a command",
-                subject=self._name,
-                action="Find out what moved it, then prepare it again",
-            )
-
-    async def _require_arrival(self, target: Pose) -> None:
-        deadline = asyncio.get_running_loop().time() + self._timeouts.arrival
+    async def _reconnected(self) -> Link:
+        """The link, as soon as a controller that may be restarting can be reached."""
+        deadline = _now() + self._timeouts.reconnect
         while True:
-            there, status = await self.position(), await self._status()
-            if status.moving:
-                problem = f"says that the move to {target} is done, and still moves"
-            elif there is None:
-                problem = f"does not know where it is after the move to {target}"
-            elif self._agree(there.pose, target):
-                self._left_at = there.pose
-                return
-            else:
-                problem = f"says that it is at {target}, and is at {there.pose}"
-            if status.moving or asyncio.get_running_loop().time() > deadline:
-                raise errors.MotionInterrupted(
-                    problem, subject=self._name, action="Find out why, then prepare it and measure again"
-                )
-            await asyncio.sleep(self._timeouts.poll)
+            try:
+                return await self._linked(self._timeouts.connect)
+            except errors.ConnectionLost:
+                if _now() > deadline:
+                    raise
+                await asyncio.sleep(self._timeouts.poll)
 
-    async def _commanded(self, do: str, limit_s: float, *, refuses: str = "", **fields: object) -> None:
-        """Have something done that may move the robot; it is stopped if it is not done.
+    def _connected(self) -> Link:
+        """The link as it is; raises what broke it."""
+        self._require_open()
+        if self._link is None:
+            action = "Prepare it again"
+            raise errors.ConnectionLost("is not connected any more", subject=self._name, action=action)
+        self._link.require_sound()
+        return self._link
 
-        Raises:
-            DeviceError: it failed.
-        """
+    def _require_open(self) -> None:
+        if not self._is_open:
+            raise DeviceError("is not connected", subject=self._name, action="Open it first")
+
+    async def _status(self, link: Link) -> Status:
+        status = self._done(await link.ask("status", Status), "status")
+        self._was_enabled |= status.enabled
+        return status
+
+    async def _position(self, link: Link) -> Position:
+        return self._done(await link.ask("position", Position), "position")
+
+    def _done(self, answer: AnswerT | Failed, do: str) -> AnswerT:
+        if not isinstance(answer, Failed):
+            return answer
+        if answer.kind == "interrupted":
+            problem = f"was interrupted: '{do}' ended early, {answer.reason}"
+            raise errors.MotionInterrupted(problem, subject=self._name, action=answer.action)
+        raise errors.CommandRefused(f"'{do}'", answer.reason, subject=self._name, action=answer.action)
+
+    async def _do(self, link: Link, do: str, limit_s: float) -> None:
+        """An order other than a move; what is not done in time, or is cancelled, is stopped."""
         try:
-            await self._requested(do, messages.Nothing, limit_s, refuses=refuses or f"'{do}'", **fields)
+            self._done(await link.ask(do, Nothing, limit_s), do)
+        except TimeoutError:
+            await self.stop()
+            problem = f"has not done '{do}' after {limit_s:g} s"
+            raise DeviceError(problem, subject=self._name, action="Look at the controller itself") from None
         except asyncio.CancelledError:
             with suppress(DeviceError):
                 await self.stop()
             raise
-        except errors.ConnectionLost:
-            await self._stop_after_failure()
-            raise
 
-    async def _stop_after_failure(self) -> None:
-        """Stop what may still move; that this fails too is of less interest than the failure."""
-        stops = self._stops
-        with suppress(DeviceError):
+    async def _make_ready(self, link: Link, permitted: interfaces.StartupActions, stops: int) -> None:
+        if self._is_reloading:  # then it was on, and this driver switched it off
+            permitted |= {StartupAction.SWITCH_ON}
+        last: StartupAction | None = None
+        await self._require_rest(await self._status(link))
+        while (action := self._next_action(status := await self._status(link))) is not None:
+            if action is last:
+                said = "; ".join(status.errors) or "it gives no reason"
+                problem = f"says that '{_REQUESTS[action]}' is done, which had no effect: {said}"
+                raise DeviceError(problem, subject=self._name, action="Look at the controller itself")
+            if action not in permitted:
+                raise errors.StartupNotPermitted(action, self._name)
+            permitted -= {action}  # what is needed again was undone by somebody
+            self._require_remote(status)
+            if self._stop_count != stops:
+                raise errors.MotionInterrupted("was stopped before it was ready", subject=self._name)
+            homes = action is StartupAction.HOME
+            if homes:
+                self._joints_before_reload = None  # they may move
+            limit_s = self._settings.homing_timeout_s if homes else self._timeouts.command
+            await self._do(link, _REQUESTS[action], limit_s)
+            last = action
+        self._require_remote(status)
+        await self._require_rest(status)
+        await self._require_place(link)
+        self._unready, self._is_reloading = "", False
+
+    async def _require_rest(self, status: Status) -> None:
+        if status.moving:
             await self.stop()
-        self._stops = stops  # nobody asked for it
+            action = "See that nobody else moves the robot, then prepare it again"
+            raise errors.MotionInterrupted("moved without being asked", subject=self._name, action=action)
 
-    async def _status(self) -> messages.Status:
-        return await self._asked("status", messages.Status)
+    async def _require_place(self, link: Link) -> None:
+        """Require that it is where it was before a reload."""
+        found = await self._position(link)
+        if found.pose is None:
+            raise DeviceError("is homed, and does not know where it is", subject=self._name)
+        before, joints = self._joints_before_reload, _joints(found)
+        # With other zeros it reports other joints where it stands: encoders then show whether it moved.
+        if before is not None and joints is not None and not self._settings.joints_include_zeros:
+            require_unmoved(before, joints, self._settings.position_tolerance_mm, self._name)
+        self._joints_before_reload, self._here = None, pose_of(found.pose)
 
-    async def _asked(self, do: str, wanted: type[AnswerType]) -> AnswerType:
-        return await self._requested(do, wanted, self._timeouts.answer, refuses=f"'{do}'")
+    def _next_action(self, status: Status) -> StartupAction | None:
+        """The next action that it needs before it can move; None if it is ready."""
+        if status.estop:
+            is_later = self._was_enabled
+            return StartupAction.RESET_ESTOP if is_later else StartupAction.RESET_INITIAL_ESTOP
+        if not status.enabled:
+            return StartupAction.SWITCH_ON
+        return None if status.homed else StartupAction.HOME
 
-    async def _requested(
-        self, do: str, wanted: type[AnswerType], limit_s: float, *, refuses: str, **fields: object
-    ) -> AnswerType:
-        link = await self._connected()
+    def _require_remote(self, status: Status) -> None:
+        if not status.remote:
+            action = "Switch it to remote, or to automatic, then prepare it again"
+            raise DeviceError("takes no commands from here", subject=self._name, action=action)
+
+    async def _carry_out(self, link: Link, pose: Pose, duration_s: float, stops: int) -> None:
+        """Move, and return at rest at the pose."""
+        limit_s = 2.0 * duration_s + self._timeouts.beyond_move
+        start = self._here or pose_of((await self._position(link)).pose or list(pose.as_tuple()))
+        self._here = None
         try:
-            return await link.request(do, wanted, limit_s, **fields)
-        except RequestFailed as failed:
-            raise self._error(failed.failure, do, refuses) from failed
+            answer = await link.ask(
+                "move",
+                Nothing,
+                limit_s,
+                {"pose": list(pose.as_tuple()), "duration_s": duration_s},
+                lambda at: _aside(start, at, pose),
+            )
+        except TimeoutError:
+            await self.stop()
+            problem = f"was still moving after {limit_s:g} s and was stopped"
+            action = "Look for what slows it down, or state less [speed]"
+            raise errors.MotionInterrupted(problem, subject=self._name, action=action) from None
+        except errors.ConnectionLost:
+            await self.stop()
+            raise
+        except asyncio.CancelledError:
+            with suppress(DeviceError):
+                await self.stop()
+                self._unready = ""
+            raise
+        if isinstance(answer, Failed):
+            await self._raise_failure(link, answer, start, pose, stops)
+        await self._verify(link, pose, stops)
 
-    def _error(self, failure: messages.Failure, do: str, refuses: str) -> DeviceError:
-        reason, name = failure.reason, self._name
-        match failure.kind:
-            case messages.FailureKind.POSE if do == "move":
-                return errors.PoseRefused(
-                    refuses, reason, subject=name, axis=failure.axis, is_highest=failure.highest
-                )
-            case messages.FailureKind.REFUSED if do == "move":
-                return errors.MoveRefused(refuses, reason, subject=name, action=failure.action)
-            case messages.FailureKind.POSE | messages.FailureKind.REFUSED:
-                return errors.CommandRefused(refuses, reason, subject=name, action=failure.action)
-            case messages.FailureKind.INTERRUPTED:
-                return errors.MotionInterrupted(
-                    f"was interrupted: {reason}", subject=name, action=failure.action or ACTION
-                )
-            case _:
-                return DeviceError(
-                    f"failed at '{do}': {reason}", subject=name, action=failure.action or ACTION
-                )
-
-    async def _connected(self) -> Link:
-        """The connection; a broken one is replaced, after which the controller must be prepared again."""
-        async with self._connecting:
-            if self._link is not None and self._link.broken is None:
-                return self._link
-            if self._link is not None:
-                await self._link.close(self._timeouts.closing)
-            self._is_unready = True
-            link = self._link = Link(self._program, self._trace)
-            await link.open(self._timeouts.connect)
-            address = {} if self._settings.port is None else {"port": self._settings.port}
-            try:
-                self._hello = await link.request(
-                    "hello",
-                    messages.Hello,
-                    self._timeouts.connect,
-                    version=messages.VERSION,
-                    host=self._settings.host,
-                    **address,
-                    settings=dict(self._program.settings),
-                )
-            except RequestFailed as failed:
-                await link.close(self._timeouts.closing)
-                raise self._error(failed.failure, "hello", "to begin") from failed
-            return link
-
-    async def _disconnect(self) -> None:
-        async with self._connecting:
-            link, self._link = self._link, None
-            self._is_unready = True
-            if link is not None:
-                await link.close(self._timeouts.closing)
-
-    def _agree(self, one: Pose, other: Pose, tolerances: float = 1.0) -> bool:
-        position, angle = pose_difference(one, other)
-        settings = self._settings
-        return (
-            position <= tolerances * settings.position_tolerance_mm
-            and angle <= tolerances * settings.angle_tolerance_deg
+    async def _raise_failure(
+        self, link: Link, failed: Failed, start: Pose, target: Pose, stops: int
+    ) -> None:
+        """Raise the error for a move that failed, the robot at rest."""
+        if failed.kind in {"pose", "refused"}:
+            await self._verify(link, start, stops)  # nothing moved
+            if failed.kind == "refused":
+                raise self._refused(target, failed.reason, failed.action)
+            self._unready, self._here = "", start
+            raise errors.PoseRefused(
+                f"to move to {target}",
+                failed.reason,
+                subject=self._name,
+                axis=failed.axis,
+                is_highest=failed.highest,
+            )
+        was_stopped = self._stop_count != stops and failed.kind == "interrupted"
+        await self.stop()
+        there = (await self._position(self._connected())).pose
+        where = "" if there is None else f" at {pose_of(there)}"
+        if was_stopped:
+            self._unready = ""
+        raise errors.MotionInterrupted(
+            f"stopped{where} before reaching {target}: {failed.reason}",
+            subject=self._name,
+            action=failed.action or "Find out why it stopped, then prepare it and measure this pose again",
         )
 
+    async def _verify(self, link: Link, pose: Pose, stops: int) -> None:
+        """Require that it rests at a pose; it is stopped where it does not."""
+        status, found = await self._status(link), await self._position(link)
+        there = None if found.pose is None else pose_of(found.pose)
+        if not status.moving and there is not None and agree(there, pose, self._settings):
+            return
+        was_stopped = self._stop_count != stops
+        await self.stop()
+        if was_stopped:
+            self._unready = ""
+        raise errors.MotionInterrupted(
+            f"is {'moving' if status.moving else 'at rest'} at {there}, not at rest at {pose}, after "
+            f"{'it was stopped' if was_stopped else 'it said that the move was over'}",
+            subject=self._name,
+            action="Find out why, then prepare it and measure this pose again",
+        )
 
-_WORDS = {
-    Action.RESET_INITIAL_ESTOP: "reset-estop",
-    Action.RESET_ESTOP: "reset-estop",
-    Action.SWITCH_ON: "switch-on",
-    Action.HOME: "home",
-}
+    async def _stop_over(self, link: Link) -> None:
+        limit_s = self._timeouts.stop
+        deadline = _now() + limit_s
+        while True:  # again, as the first one may precede the motion
+            self._done(await link.ask("stop", Nothing, limit_s), "stop")
+            if await link.has_ended(self._timeouts.poll) and not (await self._status(link)).moving:
+                return
+            if _now() > deadline:
+                link.fail(f"still moves {limit_s:g} s after the stop command")
+                link.require_sound()
+
+    def _refused(self, pose: Pose, reason: str, action: str | None = None) -> errors.MoveRefused:
+        return errors.MoveRefused(f"to move to {pose}", reason, subject=self._name, action=action)
+
+
+def _aside(start: Pose, at: Pose, target: Pose) -> str | None:
+    """What is wrong with a pose on the way, if anything is."""
+    length = math.dist(start.as_tuple()[:3], target.as_tuple()[:3])
+    over = math.dist(start.as_tuple()[:3], at.as_tuple()[:3]) + math.dist(
+        at.as_tuple()[:3], target.as_tuple()[:3]
+    )
+    if over - length <= _ASIDE_MM + _ASIDE_SHARE * length:
+        return None
+    return f"says that it is at {at}, which is not on the way from {start} to {target}"
+
+
+def _joints(found: Position) -> tuple[float, ...] | None:
+    return None if found.joints is None else tuple(found.joints)
+
+
+def _now() -> float:
+    return asyncio.get_running_loop().time()

@@ -11,7 +11,7 @@ import queue
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Protocol, TextIO
 
 VERSION = 1
@@ -53,13 +53,13 @@ class Robot(Protocol):
         """Stop the motion in place, at once; returns at rest."""
 
 
-def serve(robot: Robot, lines: TextIO = sys.stdin, answers: TextIO = sys.stdout) -> None:
+def serve(robot: Robot, lines: Iterable[str] = sys.stdin, answers: TextIO = sys.stdout) -> None:
     """Answer each line of requests until they end; then the robot is stopped."""
     _Service(robot, lines, answers).run()
 
 
 class _Service:
-    def __init__(self, robot: Robot, lines: TextIO, answers: TextIO) -> None:
+    def __init__(self, robot: Robot, lines: Iterable[str], answers: TextIO) -> None:
         self._robot, self._lines, self._answers = robot, lines, answers
         self._writing = threading.Lock()
         self._orders: queue.SimpleQueue[Told | None] = queue.SimpleQueue()

@@ -9,7 +9,7 @@ from drivers import errors, interfaces
 from drivers.controllers.linuxcnc import protocol, startup
 from drivers.controllers.linuxcnc.commands import ControllerCommands
 from drivers.controllers.linuxcnc.session import Session
-from drivers.controllers.poses import pose_difference, require_unmoved
+from drivers.controllers.poses import agree, require_unmoved
 from drivers.controllers.reload_command import run_reload_command
 from drivers.wire_trace import TraceRecorder
 from hexacell.cell.robot import ControllerSettings
@@ -263,8 +263,8 @@ class LinuxcncrshController:
         """Wait until it is there; on a computer under load the move is acknowledged before its end."""
         here, still_s = None, protocol.loop_time()
         last_s = still_s + limit_s
-        while not self._agree(there := await commands.pose(), target):
-            if here is None or not self._agree(there, here):
+        while not agree(there := await commands.pose(), target, self._settings):
+            if here is None or not agree(there, here, self._settings):
                 here, still_s = there, protocol.loop_time()
             was_stopped = self._was_stopped_since(stops)
             if was_stopped or protocol.loop_time() > min(still_s + self._timeouts.arrival, last_s):
@@ -277,11 +277,6 @@ class LinuxcncrshController:
                     action="Find out why it stopped, then prepare it and measure this pose again",
                 )
             await asyncio.sleep(self._timeouts.poll)
-
-    def _agree(self, one: Pose, other: Pose) -> bool:
-        position, angle = pose_difference(one, other)
-        settings = self._settings
-        return position <= settings.position_tolerance_mm and angle <= settings.angle_tolerance_deg
 
     def _was_stopped_since(self, stops: int) -> bool:
         return self._session.stop_count != stops

@@ -1,14 +1,22 @@
 """What PLCs do wrong while the robot moves, and what is told of it."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import astuple, dataclass
 from math import nan
 from typing import Any
 
 from asyncua import ua
 from asyncua.ua.status_codes import StatusCodes
 
+from drivers.controllers.adapter.served_robot import FailedError
+from drivers.controllers.opcua.program import Plc
 from tests.drivers.controllers.opcua.plc import VT, PlcServer
+from tests.waiting import wait_until
+
+FAR, NEAR = (0.0, 0.0, 500.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 5.0)
 
 
 @dataclass(frozen=True)
@@ -68,3 +76,46 @@ def repair(plc: PlcServer) -> None:
     plc.stands = False
     plc.set_silent(on=False)
     plc.set_unplugged(on=False)
+
+
+@contextmanager
+def prepared(plc: PlcServer) -> Iterator[Plc]:
+    """A client that has made it ready to move."""
+    client = Plc()
+    client.hello(plc.options.model_dump(mode="json"))
+    try:
+        for action in ("reset-estop", "switch-on", "home"):
+            client.start_up(action)
+        yield client
+    finally:
+        client.close()
+
+
+def moved_in_spite_of(
+    plc: PlcServer, fault: PlcFault, duration_s: float, after_s: float | None = None
+) -> str:
+    """What is told of a fault at a moment of a move, by default its begin; empty if it was done before.
+
+    The robot rests then, where it has told to be if it was done; nothing moves it until it is made ready.
+    """
+    told = ""
+    with prepared(plc) as client, ThreadPoolExecutor(1) as pool:
+        move = pool.submit(client.move, FAR, duration_s, lambda _: None)
+        if after_s is None:
+            wait_until(lambda: bool(plc.program.outputs["moving"]))
+        threading.Event().wait(after_s or 0.0)
+        fault.inject(plc)
+        try:
+            move.result()
+        except FailedError as failure:
+            told = str(failure)
+        else:
+            assert astuple(plc.machine.pose()) == FAR
+        wait_until(lambda: plc.stands or not plc.program.outputs["moving"])
+        at_rest = plc.machine.pose()
+        repair(plc)
+    with prepared(plc) as client:
+        assert plc.machine.pose() == at_rest
+        client.move(NEAR, 0.01, lambda _: None)
+        assert astuple(plc.machine.pose()) == NEAR
+    return told

@@ -1,14 +1,17 @@
 """A PLC as docs/controller-opcua.md has it: an OPC UA server, and a program that runs in cycles.
 
-``python -m tests.drivers.controllers.opcua.plc`` serves one with a machine that has no geometry.
+``python -m tests.drivers.controllers.opcua.plc CELL SERVED`` serves the devices of a simulated cell, a PLC among
+them, and writes SERVED beside it: the cell file by which hexacell runs with them.
 """
 
 import asyncio
 import logging
+import sys
 import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import astuple
 from pathlib import Path
 from typing import Any
@@ -18,8 +21,11 @@ from asyncua.server.server import Server
 from asyncua.server.user_managers import UserManager
 
 from drivers.controllers.opcua.options import NODES, Kind, OpcUaOptions
+from drivers.simulated.cell import SimulatedCell
 from drivers.simulated.linuxcnc.state import Machine, MotionRefused
 from drivers.simulated.served_device import Closeable
+from hexacell.cell.loader import dump, load_cell
+from hexacell.cell.model import CellSettings
 from hexacell.errors import HexacellError
 from hexacell.kinematics.pose import Pose
 from hexacell.storage.opcua_certificate import ensure_certificate
@@ -259,3 +265,28 @@ class PlcServer(Closeable):
 
     def _do(self, work: Any) -> Any:
         return asyncio.run_coroutine_threadsafe(work, self._loop).result()
+
+
+def with_plc(settings: CellSettings, plc: PlcServer) -> CellSettings:
+    """The settings of a cell whose robot this PLC moves."""
+    controller = settings.controller.model_copy(update={"protocol": "opcua", "options": plc.options})
+    return settings.model_copy(update={"controller": controller})
+
+
+def main(cell_file: str, served_file: str) -> None:
+    """Serve a cell until Ctrl-C."""
+    cell = load_cell(Path(cell_file))
+    with (
+        SimulatedCell(cell.settings, cell.config_paths, other_processes=True) as simulated,
+        PlcServer(simulated.machine) as plc,
+        suppress(KeyboardInterrupt),
+    ):
+        Path(served_file).write_text(dump(with_plc(simulated.settings, plc)))
+        print(
+            f"{plc.options.endpoint} is served; in another terminal: hexacell run {served_file}", flush=True
+        )
+        threading.Event().wait()
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -14,7 +14,7 @@ from hexacell.verdict.decision import Verdict
 from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase
 from procedures.run.state import fold
-from tests.drivers.controllers.opcua.plc import PlcServer
+from tests.drivers.controllers.opcua.plc import PlcServer, with_plc
 from tests.hexacell.services.conftest import maker, order_of
 from tests.small_cell import few_candidates
 
@@ -24,9 +24,7 @@ async def test_it_passes(tmp_path: Path) -> None:
     with few_candidates(), SimulatedCell(cell.settings, cell.config_paths) as simulated:
         plc = await asyncio.to_thread(PlcServer, simulated.machine)
         try:
-            controller = {"protocol": "opcua", "options": plc.options}
-            changed = simulated.settings.controller.model_copy(update=controller)
-            settings = simulated.settings.model_copy(update={"controller": changed})
+            settings = with_plc(simulated.settings, plc)
             ended = await calibrate(order_of(replace(cell, settings=settings), folder))
         finally:
             await asyncio.to_thread(plc.close)

@@ -81,6 +81,7 @@ async def test_it_logs_in_over_an_encrypted_connection_and_no_trace_has_the_pass
     server = await asyncio.to_thread(
         lambda: PlcServer(MachineInTime(), real=VT.Float, folder=tmp_path, users=OnlyHexacell())
     )
+    server.cycle_s = 0.1
     try:
         options = server.options.model_copy(
             update={

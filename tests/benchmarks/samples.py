@@ -6,6 +6,7 @@ A variable of the environment of the same name takes precedence: ``ROBOTS=24 mak
 import os
 
 SAMPLES: dict[str, dict[str, tuple[int, int]]] = {
+    "adapter": {"FAULTS": (200, 1000)},
     "change_alarm": {"RUNS": (48, 200)},
     "check": {"RUNS": (8, 100)},
     "damaged_lines": {"FRAMES": (5_000, 1_000_000)},

@@ -34,8 +34,8 @@ class Robot(Protocol):
     What is returned is the answer's ``done``; a failure is a :class:`FailedError`.
     """
 
-    def hello(self, settings: Told) -> Told:
-        """Connect, by the settings of the cell file; its name and description. Nothing moves."""
+    def hello(self, told: Told) -> Told:
+        """Connect, by ``settings``, ``host`` and ``port`` of the cell file; its name. Nothing moves."""
 
     def status(self) -> Told:
         """``estop``, ``enabled``, ``homed``, ``remote``, ``moving``, ``errors``, ``heartbeat``."""
@@ -97,7 +97,7 @@ class _Service:
         if do == "hello":
             if request["version"] != VERSION:
                 raise FailedError("refused", f"this program has version {VERSION} of the protocol")
-            return {"version": VERSION, "length": "mm", "angle": "deg", **robot.hello(request["settings"])}
+            return {"version": VERSION, "length": "mm", "angle": "deg", **robot.hello(request)}
         if do in {"status", "position", "stop"}:
             answer: Told | None = getattr(robot, do)()
             return answer

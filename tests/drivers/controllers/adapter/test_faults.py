@@ -1,0 +1,110 @@
+"""A program that lies, hangs, dies or talks nonsense is named, the robot stopped, and nothing moves after it."""
+
+import random
+from pathlib import Path
+
+import pytest
+
+from drivers.errors import (
+    ConnectionLost,
+    MotionInterrupted,
+    MoveRefused,
+    PoseRefused,
+    ResponseTimeout,
+    StartupNotPermitted,
+    WrongAnswer,
+)
+from hexacell.errors import DeviceError
+from tests.drivers.controllers.adapter.faulty import ALL, EVERY, TARGETS, done_by, driver, whole_job
+
+NONSENSE = (
+    "garbage",
+    "text",
+    "list",
+    "empty",
+    "no answer in it",
+    "two answers in it",
+    "number as text",
+    "nested",
+)
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    return tmp_path / "done"
+
+
+async def test_without_a_fault_the_whole_job_is_done(log: Path) -> None:
+    assert await whole_job(driver(log), log) is None
+    assert done_by(log) == 6 * ["move", "rest"]
+
+
+@pytest.mark.parametrize(
+    ("fault", "at", "kind", "words"),
+    [
+        ("silence", "move", ResponseTimeout, "has not answered 'move' after"),
+        ("silence", "status", ResponseTimeout, "has not answered 'status'"),
+        *((nonsense, "status", WrongAnswer, "does not belong to the protocol") for nonsense in NONSENSE),
+        ("long", "position", WrongAnswer, "more than 65536 bytes"),
+        ("endless", "position", WrongAnswer, "more than 65536 bytes"),
+        ("nan", "position", WrongAnswer, "belong"),
+        ("infinite", "move", WrongAnswer, "belong"),
+        ("another number", "status", WrongAnswer, "no request of this number waits"),
+        ("twice", "move", DeviceError, ""),
+        ("inch", "hello", WrongAnswer, "length: Input should be 'mm'"),
+        ("version 2", "hello", WrongAnswer, "version: Input should be 1"),
+        ("not remote", "status", DeviceError, "takes no commands from here"),
+        ("early", "move", MotionInterrupted, "is done, and still moves"),
+        ("elsewhere", "position", MotionInterrupted, "says that it is at"),
+        ("nowhere", "position", MotionInterrupted, "does not know where it is"),
+        ("half", "move", ConnectionLost, "ended with code 0"),
+        ("exit", "home", ConnectionLost, "ended with code 3: out of oil"),
+        ("pose", "move", PoseRefused, "so it is"),
+        ("refused", "move", MoveRefused, "so it is"),
+        ("interrupted", "move", MotionInterrupted, "was interrupted: so it is"),
+        ("fault", "switch-on", DeviceError, "failed at 'switch-on': so it is"),
+        ("refused", "hello", DeviceError, "so it is"),
+    ],
+)
+async def test_each_is_named(log: Path, fault: str, at: str, kind: type[DeviceError], words: str) -> None:
+    nth = 0 if fault in {"elsewhere", "nowhere"} else 1
+    error = await whole_job(driver(log, fault, at, nth), log)
+    assert isinstance(error, kind), error
+    assert words in error.problem
+
+
+async def test_a_flood_on_stderr_harms_nothing(log: Path) -> None:
+    assert await whole_job(driver(log, "flood", "status"), log) is None
+
+
+async def test_a_robot_that_moved_by_itself_does_not_move_before_it_is_prepared(log: Path) -> None:
+    error = await whole_job(driver(log, "jump", "position", nth=2), log)
+    assert isinstance(error, MotionInterrupted)
+    assert "it moved without a command" in error.problem
+
+
+async def test_what_is_not_permitted_is_not_asked_for(log: Path) -> None:
+    controller = driver(log)
+    await controller.open()
+    with pytest.raises(StartupNotPermitted, match="emergency stop"):
+        await controller.prepare(frozenset())
+    await controller.close()
+
+
+async def test_after_a_failure_it_moves_again_once_prepared(log: Path) -> None:
+    controller = driver(log, "exit", "move", nth=2)
+    await controller.open()
+    await controller.prepare(ALL)
+    await controller.move(TARGETS[0], 0.05)
+    with pytest.raises(ConnectionLost, match="out of oil"):
+        await controller.move(TARGETS[1], 0.05)
+    await controller.prepare(ALL)  # by another process of the program
+    await controller.move(TARGETS[2], 0.05)
+    await controller.close()
+
+
+@pytest.mark.parametrize("seed", range(40))
+async def test_any_fault_anywhere(log: Path, seed: int) -> None:
+    drawn = random.Random(seed)
+    fault, at = drawn.choice(EVERY)
+    await whole_job(driver(log, fault, at, nth=drawn.choice([1, 1, 2, 3])), log)

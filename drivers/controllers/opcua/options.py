@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from hexacell.cell.fields import Positive, Six, Text, broken_rule, key
 from hexacell.cell.passwords import Login, stated_login
 from hexacell.cell.robot import ControllerOptions
-from hexacell.errors import UsageError, did_you_mean
+from hexacell.errors import UsageError
 
 VARIABLES = {"user": "HEXACELL_CONTROLLER_USER", "password": "HEXACELL_CONTROLLER_PASSWORD"}
 
@@ -65,7 +65,7 @@ class OpcUaOptions(ControllerOptions):
     @model_validator(mode="after")
     def _has_its_nodes(self) -> Self:
         if unknown := next((name for name in self.nodes if name not in NODES), None):
-            raise broken_rule(f"there is no node '{unknown}'", did_you_mean(unknown, NODES) or "Remove it")
+            raise broken_rule(f"there is no node '{unknown}'", "Write a name of docs/controller-opcua.md")
         if missing := [name for name, ids in self.node_ids().items() if not (ids or name in OPTIONAL)]:
             action = "Write them in nodes, or write node with {name} in it"
             raise broken_rule(f"no node id for {', '.join(missing)}", action)

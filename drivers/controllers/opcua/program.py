@@ -16,8 +16,8 @@ from drivers.controllers.opcua.options import OpcUaOptions
 
 ANSWER_S = 3.0
 """Longest wait until a PLC takes a command over, resets its answer, or rests after a stop."""
-POLL_S, BEAT_S, REPORT_S = 0.01, 0.2, 0.2
-"""Pauses between two reads while something is waited for, two counts, two reports of a place."""
+POLL_S, BEAT_S = 0.01, 0.2
+"""Pauses between two reads while something is waited for, and between two counts."""
 LARGEST = 2**15 - 1
 """Largest integer that is written: that of 16 bits with a sign."""
 MOVE = 1
@@ -38,9 +38,9 @@ class Plc:
     """A PLC as a robot that is served."""
 
     def __init__(self) -> None:
-        # The last two numbers and counts that were written: a read may be before or after the last.
-        self._numbers = deque([random.randint(1, LARGEST)], maxlen=2)  # noqa: S311 - no secret
-        self._counts = deque([0], maxlen=2)
+        # The last numbers and counts that were written: a read may be from before the latest.
+        self._numbers = deque([random.randint(1, LARGEST)], maxlen=5)  # noqa: S311 - no secret
+        self._counts = deque([0], maxlen=5)
         self._stops = self._stopping = 0
         self._edges, self._closing = threading.Lock(), threading.Event()
         self._heartbeat: int | None = None
@@ -83,9 +83,9 @@ class Plc:
         self._command(code)
         self._until(lambda seen: seen[name] is value, f"says done, but {name} is not {value}")
 
-    def move(self, pose: Sequence[float], duration_s: float, report: Report) -> None:
+    def move(self, pose: Sequence[float], duration_s: float, _report: Report) -> None:
         """Its command with a pose."""
-        self._command(MOVE, report, target=list(pose), duration=duration_s)
+        self._command(MOVE, target=list(pose), duration=duration_s)
 
     def stop(self) -> None:
         """Stop the motion, and the command; where it does not come to rest, it stays told to stop."""
@@ -136,7 +136,7 @@ class Plc:
                 with suppress(FailedError):  # to have heard of the PLC when somebody asks
                     self._seen()
 
-    def _command(self, code: int, report: Report | None = None, **more: Any) -> None:  # noqa: ANN401
+    def _command(self, code: int, **more: Any) -> None:  # noqa: ANN401
         """Have one command carried out; where it fails otherwise than refused, the robot is stopped."""
         self._until(
             lambda seen: not (self._stopping or any(map(seen.get, (*ANSWERS, "moving")))),
@@ -153,7 +153,7 @@ class Plc:
             with self._edges:
                 if self._stops == stops:
                     self._nodes.write(execute=True)
-            self._wait(stops, report)
+            self._wait(stops)
             self._reset()
         except Exception as error:
             with suppress(FailedError):
@@ -162,10 +162,10 @@ class Plc:
                 self._reset()
             raise
 
-    def _wait(self, stops: int, report: Report | None) -> None:
+    def _wait(self, stops: int) -> None:
         """Until the PLC says done of the last command; raises what else it says."""
         number, is_taken, lapses = self._numbers[-1], False, 0
-        begun_s = reported_s = time.monotonic()
+        begun_s = time.monotonic()
         while True:
             seen, now = self._seen(), time.monotonic()
             if self._stops != stops:
@@ -181,9 +181,6 @@ class Plc:
                     raise FailedError("interrupted", "the PLC ended it, and says neither done nor error")
             elif is_taken or now - begun_s > ANSWER_S:
                 raise fault(f"the PLC answers command {seen['answered']}, not {number} as it was told")
-            if report is not None and seen["pose"] and now - reported_s > REPORT_S:
-                reported_s = now
-                report(seen["pose"])
             time.sleep(POLL_S)
 
     def _judge(self, seen: Values) -> None:

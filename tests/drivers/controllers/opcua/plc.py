@@ -1,7 +1,7 @@
 """A PLC as docs/controller-opcua.md has it: an OPC UA server, and a program that runs in cycles.
 
-``python -m tests.drivers.controllers.opcua.plc CELL SERVED`` serves the devices of a simulated cell, a PLC among
-them, and writes SERVED beside it: the cell file by which hexacell runs with them.
+``python -m tests.drivers.controllers.opcua.plc CELL SERVED`` serves a simulated cell with such a PLC, and
+writes SERVED beside it: the cell file by which hexacell runs with them.
 """
 
 import asyncio

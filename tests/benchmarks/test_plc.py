@@ -1,6 +1,7 @@
 """Faults of a PLC at random moments, and how much longer than by linuxcncrsh a move takes by OPC UA."""
 
 import asyncio
+import re
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -43,7 +44,7 @@ def test_no_fault_is_silent_or_unsafe(plc: PlcServer, figure) -> None:
         except Exception as error:  # whatever it is, it is no answer
             failures, words = failures + 1, repr(error)
             repair(plc)
-        told[f"{fault.name}: {words.partition(' (')[0][:60] or 'done before'}"] += 1
+        told[f"{fault.name}: {re.sub(r'-?[0-9]+', '#', words)[:60] or 'done before'}"] += 1
     for words, count in sorted(told.items()):
         print(f"{count:5} {words}")
     figure("faults of a PLC that are silent, unsafe or no answer", failures, f"of {FAULTY}", at_most(0))

@@ -46,9 +46,9 @@ class Plc:
         self._heartbeat: int | None = None
         self._is_connected = False
 
-    def hello(self, settings: Told) -> Told:
+    def hello(self, told: Told) -> Told:
         """Connect, and see that nobody else commands this PLC."""
-        options = OpcUaOptions.model_validate_json(json.dumps(settings))
+        options = OpcUaOptions.model_validate_json(json.dumps(told["settings"]))
         self._nodes = PlcNodes(options)
         self._nodes.connect()
         first = self._nodes.read()

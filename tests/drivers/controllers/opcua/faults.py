@@ -82,7 +82,7 @@ def repair(plc: PlcServer) -> None:
 def prepared(plc: PlcServer) -> Iterator[Plc]:
     """A client that has made it ready to move."""
     client = Plc()
-    client.hello(plc.options.model_dump(mode="json"))
+    client.hello({"settings": plc.options.model_dump(mode="json")})
     try:
         for action in ("reset-estop", "switch-on", "home"):
             client.start_up(action)

@@ -106,7 +106,7 @@ async def test_it_logs_in_over_an_encrypted_connection_and_no_trace_has_the_pass
 
 
 def test_who_comes_second_is_refused(server: PlcServer) -> None:
-    first, told = Plc(), server.options.model_dump(mode="json")
+    first, told = Plc(), {"settings": server.options.model_dump(mode="json")}
     first.hello(told)
     try:
         with pytest.raises(FailedError, match="another program commands this PLC"):

@@ -69,8 +69,9 @@ class PlcNodes:
         asked = [one for each in self._ids.values() for one in each]
         answers = iter(self._do(self._client.uaclient.read_attributes(asked, AttributeIds.Value)))
         data = {name: list(islice(answers, len(each))) for name, each in self._ids.items()}
-        self._types = {name: [_variant(one).VariantType for one in each] for name, each in data.items()}
         values = {name: _checked(name, each) for name, each in data.items() if name not in PLACES}
+        if not self._types:  # of the first read, as a later one may be wrong and it must be stopped
+            self._types = {name: [_variant(one).VariantType for one in each] for name, each in data.items()}
         return values | {name: _checked(name, data[name]) if values["homed"] else None for name in PLACES}
 
     def write(self, **values: Any) -> None:  # noqa: ANN401 - as the nodes are

@@ -16,10 +16,11 @@ from drivers.controllers.opcua.options import OpcUaOptions
 
 ANSWER_S = 3.0
 """Longest wait until a PLC takes a command over, resets its answer, or rests after a stop."""
-POLL_S, BEAT_S = 0.01, 0.2
-"""Pauses between two reads while something is waited for, and between two counts."""
+POLL_S, BEAT_S, REPORT_S = 0.01, 0.2, 0.1
+"""Pauses between two reads while something is waited for, two counts, two reports of a place."""
 LARGEST = 2**15 - 1
 """Largest integer that is written: that of 16 bits with a sign."""
+LONGEST_TEXT = 500
 MOVE = 1
 ACTIONS: dict[str, tuple[int, str, bool]] = {
     "reset-estop": (2, "estop", False),
@@ -83,9 +84,9 @@ class Plc:
         self._command(code)
         self._until(lambda seen: seen[name] is value, f"says done, but {name} is not {value}")
 
-    def move(self, pose: Sequence[float], duration_s: float, _report: Report) -> None:
+    def move(self, pose: Sequence[float], duration_s: float, report: Report) -> None:
         """Its command with a pose."""
-        self._command(MOVE, target=list(pose), duration=duration_s)
+        self._command(MOVE, report, target=list(pose), duration=duration_s)
 
     def stop(self) -> None:
         """Stop the motion, and the command; where it does not come to rest, it stays told to stop."""
@@ -136,24 +137,23 @@ class Plc:
                 with suppress(FailedError):  # to have heard of the PLC when somebody asks
                     self._seen()
 
-    def _command(self, code: int, **more: Any) -> None:  # noqa: ANN401
+    def _command(self, code: int, report: Report | None = None, **more: Any) -> None:  # noqa: ANN401
         """Have one command carried out; where it fails otherwise than refused, the robot is stopped."""
+        stops = self._stops
         self._until(
             lambda seen: not (self._stopping or any(map(seen.get, (*ANSWERS, "moving")))),
             "is busy with another command, or moves",
         )
-        stops = self._stops
         self._numbers.append(self._numbers[-1] % LARGEST + 1)
         written = {"command": code, "number": self._numbers[-1], "stop": False, **more}
-        self._nodes.write(**written)
+        self._write_unless_stopped(stops, **written)
         kept = self._seen()  # before the edge, as a PLC may take arrays over in pieces
+        self._require_not_stopped(stops)
         if wrong := next((name for name, value in written.items() if not same(value, kept[name])), None):
             raise fault(f"{wrong} is {kept[wrong]} in the PLC, not {written[wrong]} as it was written")
         try:
-            with self._edges:
-                if self._stops == stops:
-                    self._nodes.write(execute=True)
-            self._wait(stops)
+            self._write_unless_stopped(stops, execute=True)
+            self._wait(stops, report)
             self._reset()
         except Exception as error:
             with suppress(FailedError):
@@ -162,32 +162,44 @@ class Plc:
                 self._reset()
             raise
 
-    def _wait(self, stops: int) -> None:
+    def _write_unless_stopped(self, stops: int, **values: Any) -> None:  # noqa: ANN401 - as the nodes are
+        with self._edges:
+            self._require_not_stopped(stops)
+            self._nodes.write(**values)
+
+    def _require_not_stopped(self, stops: int) -> None:
+        if self._stops != stops:
+            raise FailedError("interrupted", "stopped")
+
+    def _wait(self, stops: int, report: Report | None) -> None:
         """Until the PLC says done of the last command; raises what else it says."""
         number, is_taken, lapses = self._numbers[-1], False, 0
-        begun_s = time.monotonic()
+        begun_s = reported_s = time.monotonic()
         while True:
             seen, now = self._seen(), time.monotonic()
-            if self._stops != stops:
-                raise FailedError("interrupted", "stopped")
+            self._require_not_stopped(stops)
             if not seen["execute"]:
                 raise fault("execute is false: the PLC restarted, or another client")
             if seen["answered"] == number:
                 is_taken = True
                 if seen["done"] or seen["error"]:
-                    return self._judge(seen)
+                    return self._judge(seen, stops)
                 lapses = 0 if seen["busy"] else lapses + 1
                 if lapses > 1:  # one is a read between two cycles
                     raise FailedError("interrupted", "the PLC ended it, and says neither done nor error")
             elif is_taken or now - begun_s > ANSWER_S:
                 raise fault(f"the PLC answers command {seen['answered']}, not {number} as it was told")
+            if report is not None and seen["pose"] and now - reported_s > REPORT_S:
+                reported_s = now
+                report(seen["pose"])
             time.sleep(POLL_S)
 
-    def _judge(self, seen: Values) -> None:
+    def _judge(self, seen: Values, stops: int) -> None:
         if seen["error"]:
             code, text = seen["error_number"], seen["error_text"] or "no text"
-            raise FailedError(KINDS.get(code, "fault"), f"error {code} of the PLC: {text}")
+            raise FailedError(KINDS.get(code, "fault"), f"error {code} of the PLC: {text[:LONGEST_TEXT]}")
         again = self._seen()
+        self._require_not_stopped(stops)
         if again["moving"] or again["busy"] or not again["done"]:
             raise fault("the PLC says done, but is busy or moves")
 

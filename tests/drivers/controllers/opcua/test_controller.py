@@ -1,13 +1,16 @@
 """A PLC is driven as any controller is, by certificate and password, and by one client only."""
 
 import asyncio
+import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from asyncua.crypto.permission_rules import User, UserRole
 from asyncua.server.user_managers import UserManager
+from pydantic import ValidationError
 
 from drivers import conformance
 from drivers.controllers.adapter.served_robot import FailedError
@@ -18,7 +21,7 @@ from drivers.interfaces import Controller, StartupAction
 from drivers.wire_trace import WireTrace
 from hexacell.cell.robot import ControllerSettings
 from hexacell.cell.simulation import FaultKind
-from hexacell.errors import DeviceError
+from hexacell.errors import DeviceError, UsageError
 from hexacell.kinematics.pose import Pose
 from tests.drivers.conformance.test_encoders import MachineInTime
 from tests.drivers.controllers.opcua.plc import VT, PlcServer
@@ -114,3 +117,28 @@ def test_who_comes_second_is_refused(server: PlcServer) -> None:
         first.start_up("reset-estop")
     finally:
         first.close()
+
+
+@pytest.mark.parametrize(
+    ("told", "mistake"),
+    [
+        ({"endpoint": "opc.tcp://me:secret@plc"}, "endpoint"),
+        ({"node": ""}, "no node id for execute"),
+        ({"nodes": {"stopp": "i=7"}}, "there is no node 'stopp'"),
+        ({"nodes": {"stop": ""}}, "no node id for stop"),
+        ({"nodes": {"pose": ["i=7"] * 5}}, "nodes.pose"),
+        ({"nodes": {"pose": "seven"}}, "nodes.pose"),
+    ],
+)
+def test_mistakes_of_the_cell_file_are_named(told: dict[str, Any], mistake: str) -> None:
+    right = {"endpoint": "opc.tcp://plc:4840", "node": "ns=3;s={name}", "nodes": {"pose": ["i=7"] * 6}}
+    with pytest.raises(ValidationError, match=mistake):
+        OpcUaOptions.model_validate_json(json.dumps(right | told))
+    assert len(OpcUaOptions.model_validate_json(json.dumps(right)).node_ids()["pose"]) == 6
+
+
+def test_no_password_is_sent_in_clear(server: PlcServer, monkeypatch) -> None:
+    for variable in VARIABLES.values():
+        monkeypatch.setenv(variable, PASSWORD)
+    with pytest.raises(UsageError, match="in clear"):
+        server.options.login()

@@ -83,12 +83,7 @@ class OpcUaOptions(ControllerOptions):
         return self.model_copy(update={name: str(folder / file) for name, file in stated.items() if file})
 
     def login(self) -> Login | None:
-        """Who logs in; None if nobody does.
-
-        Raises:
-            FileError: the password file cannot be read, or others can read or change it.
-            UsageError: messages are not encrypted, and would show the password.
-        """
+        """Who logs in, if anybody; raises as ``stated_login``, or ``UsageError`` if all could read it."""
         login = stated_login(self.password_file, Path(), VARIABLES)
         if login is not None and self.security == "none":
             raise UsageError("a password would be sent in clear", action="Choose another security")

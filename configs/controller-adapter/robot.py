@@ -1,97 +1,103 @@
 """Makes LinuxCNC's network shell, or that of a simulated cell, a controller by the adapter protocol."""
 
+import json
 import socket
+import sys
 import threading
 import time
 
-from drivers.controllers.adapter.served_robot import FailedError, serve
+
+class Failed(Exception): ...
 
 
 class Robot:
-    """A connection on which one line at a time is answered, also while the robot moves."""
-
     def __init__(self):
-        self.lock, self.stopped = threading.Lock(), threading.Event()
+        self.asking, self.telling, self.stopped = threading.Lock(), threading.Lock(), threading.Event()
+
+    def answer(self, request):
+        do = request["do"]
+        try:
+            done = self.order(*ORDERS[do]) if do in ORDERS else getattr(self, do)(request)
+            self.tell(request, done=done or {})
+        except Exception as error:
+            kind, reason = error.args if isinstance(error, Failed) else ("fault", repr(error))
+            self.tell(request, failed={"kind": kind, "reason": reason})
+
+    def tell(self, request, **what):
+        with self.telling:
+            print(json.dumps({"id": request["id"], **what}), flush=True)
 
     def hello(self, told):
         connection = socket.create_connection((told["host"], told.get("port", 5007)), timeout=3.0)
         self.lines = connection.makefile("rwb", buffering=0)
-        self.lines.write(b"hello EMC adapter 1.0\r\nset echo off\r\nset verbose on\r\n")
-        self.ask("set enable EMCTOO")
+        self.lines.write(
+            b"hello EMC adapter 1.0\r\nset echo off\r\nset verbose on\r\nset enable EMCTOO\r\n"
+        )
         self.ask("set set_wait received")
-        return {"name": "LinuxCNC", "description": "by its network shell"}
+        return {"version": 1, "length": "mm", "angle": "deg", "name": "LinuxCNC by its network shell"}
 
     def ask(self, command):
-        """What follows the name of what is asked for; a refusal is a failure with the reason."""
         verb, name = command.upper().split()[:2]
-        with self.lock:
+        with self.asking:
             self.lines.write(command.encode() + b"\r\n")
-            while (line := self.lines.readline().decode()) and line.split() != [verb, name, "NAK"]:
-                words = line.split()
+            while (words := self.lines.readline().decode().split()) != [verb, name, "NAK"]:
                 if words[:1] == [name] or words == [verb, name, "ACK"]:
                     return " ".join(words[1:])
-        raise FailedError("fault", f"it refuses '{command}'")
-
-    def is_on(self, what):
-        return self.ask(f"get {what}") == "ON"
-
-    def is_homed(self):
-        return "NO" not in self.ask("get joint_homed")
+        raise Failed("fault", f"it refuses '{command}'")
 
     def numbers(self, what):
         return [float(word) for word in self.ask(f"get {what}").split()[:6]]
 
-    def status(self):
-        joints, later = self.numbers("joint_pos"), self.numbers("joint_pos")
-        found = {"homed": self.is_homed(), "moving": joints != later, "heartbeat": str(later)}
-        found |= {"estop": self.is_on("estop"), "enabled": self.is_on("machine")}
-        return {**found, "remote": self.is_on("enable")}
+    def status(self, _=None):
+        before = self.numbers("joint_pos")
+        found = {
+            key: not {"OFF", "NO"} & {*self.ask(f"get {what}").split()} for key, what in STATES.items()
+        }
+        return found | {"moving": self.numbers("joint_pos") != before, "heartbeat": str(before)}
 
-    def position(self):
-        pose = self.numbers("abs_act_pos") if self.is_homed() else None
+    def position(self, _):
+        pose = self.numbers("abs_act_pos") if self.status()["homed"] else None
         return {"pose": pose, "joints": self.numbers("joint_pos")}
 
-    def until(self, is_done):
+    def order(self, key, value, *commands):
+        self.stopped.clear()
+        for command in commands:
+            self.ask(command)
+        self.wait(lambda: self.status()[key] is value)
+
+    def wait(self, is_done):
         while not is_done():
             if self.stopped.is_set():
-                raise FailedError("interrupted", "it was stopped")
+                raise Failed("interrupted", "it was stopped")
             if said := "; ".join(iter(lambda: self.ask("get error"), "OK")):
-                is_out = "exceed" in said or "kinematics" in said
-                raise FailedError("pose" if is_out else "fault", said)
+                raise Failed("pose" if "exceed" in said or "kinematics" in said else "fault", said)
             time.sleep(0.002)
 
-    def start_up(self, action):  # nothing to do for "reload": it reads its geometry when switched on
-        self.stopped.clear()
-        match action:
-            case "reset-estop":
-                self.ask("set estop off")
-                self.until(lambda: not self.is_on("estop"))
-            case "switch-on" | "switch-off":
-                self.ask(f"set machine {action[7:]}")
-                self.until(lambda: self.is_on("machine") == (action == "switch-on"))
-            case "home":
-                self.ask("set mode manual")
-                self.ask("set home -1")
-                self.until(self.is_homed)
+    def move(self, asked):
+        def is_there():
+            self.tell(asked, at=(here := self.numbers("abs_act_pos")))
+            return max(abs(a - b) for a, b in zip(here, asked["pose"])) < 1e-4
 
-    def move(self, pose, duration_s, report):
-        self.stopped.clear()
-        self.ask("set mode mdi")
-        words = " ".join(f"{axis}{value:.6f}" for axis, value in zip("XYZABCF", (*pose, 60.0 / duration_s)))
-        self.ask(f"set mdi G21 G53 G93 G1 {words}")
-        self.until(lambda: self.is_at(pose, report) or not self.is_on("machine"))
-        if not self.is_at(pose, report):
-            raise FailedError("interrupted", "it was switched off")
+        rate = 60.0 / asked["duration_s"]
+        words = " ".join(f"{axis}{value:.6f}" for axis, value in zip("XYZABCF", (*asked["pose"], rate)))
+        self.order("remote", True, "set mode mdi", f"set mdi G21 G53 G93 G1 {words}")
+        self.wait(lambda: is_there() or not self.status()["enabled"])
+        if not is_there():
+            raise Failed("interrupted", "it was switched off")
 
-    def is_at(self, pose, report):
-        report(here := self.numbers("abs_act_pos"))
-        return max(abs(a - b) for a, b in zip(here, pose)) < 1e-4
-
-    def stop(self):
+    def stop(self, _=None):
         self.stopped.set()
-        if self.is_on("machine"):
+        if self.status()["enabled"]:
             self.ask("set abort")
 
 
+STATES = {"estop": "estop", "enabled": "machine", "remote": "enable", "homed": "joint_homed"}
+ORDERS = {"reset-estop": ("estop", False, "set estop off"), "reload": ("enabled", False)}
+ORDERS |= {f"switch-{word}": ("enabled", word == "on", f"set machine {word}") for word in ("on", "off")}
+ORDERS |= {"home": ("homed", True, "set mode manual", "set home -1")}
+
 if __name__ == "__main__":
-    serve(Robot())
+    robot = Robot()
+    for line in sys.stdin:
+        threading.Thread(target=robot.answer, args=(json.loads(line),), daemon=True).start()
+    robot.stop()  # nobody is there any more who could

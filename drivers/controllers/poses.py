@@ -14,10 +14,13 @@ def pose_difference(one: Pose, other: Pose) -> tuple[float, float]:
     return max(map(abs, differences[:3])), max(map(abs, angles))
 
 
-def agree(one: Pose, other: Pose, settings: ControllerSettings) -> bool:
-    """Whether two poses are the same within the tolerances of the cell file."""
+def agree(one: Pose, other: Pose, settings: ControllerSettings, tolerances: float = 1.0) -> bool:
+    """Whether two poses are the same within so many tolerances of the cell file."""
     position, angle = pose_difference(one, other)
-    return position <= settings.position_tolerance_mm and angle <= settings.angle_tolerance_deg
+    return (
+        position <= tolerances * settings.position_tolerance_mm
+        and angle <= tolerances * settings.angle_tolerance_deg
+    )
 
 
 def require_unmoved(

@@ -137,7 +137,8 @@ class SimulatedCell(ServedGroup):
                 SimulatedSensors(settings, self.physics, clock, other_processes=other_processes)
             )
             self.gauges, self.encoders = sensors.gauges, sensors.encoders
-            is_adapter = isinstance(settings.controller.options, AdapterOptions)
+            options = settings.controller.options  # a program that is started finds LinuxCNC behind it
+            is_adapter = isinstance(options, AdapterOptions) and options.address is not None
             kind = SimulatedAdapter if is_adapter else SimulatedController
             self.controller = served.enter_context(kind(self.machine, settings.controller))
             warmth = SimulatedThermometers(settings.thermometers, self.physics.celsius)

@@ -29,6 +29,9 @@ _REQUESTS = {
     StartupAction.SWITCH_ON: "switch-on",
     StartupAction.HOME: "home",
 }
+_LEFT_TOLERANCES = 10.0
+"""A robot that nobody commands may move by so many tolerances of an arrival before the next move."""
+
 _ASIDE_MM, _ASIDE_SHARE = 5.0, 0.05
 """How much longer than a straight move the way over a pose on it may be, also as a share of it."""
 
@@ -274,8 +277,7 @@ class AdapterController:
         if self._is_reloading:  # then it was on, and this driver switched it off
             permitted |= {StartupAction.SWITCH_ON}
         last: StartupAction | None = None
-        await self._require_rest(await self._status(link))
-        while (action := self._next_action(status := await self._status(link))) is not None:
+        while (action := self._next_action(status := await self._undisturbed(link))) is not None:
             if action is last:
                 said = "; ".join(status.errors) or "it gives no reason"
                 problem = f"says that '{_REQUESTS[action]}' is done, which had no effect: {said}"
@@ -283,7 +285,6 @@ class AdapterController:
             if action not in permitted:
                 raise errors.StartupNotPermitted(action, self._name)
             permitted -= {action}  # what is needed again was undone by somebody
-            self._require_remote(status)
             if self._stop_count != stops:
                 raise errors.MotionInterrupted("was stopped before it was ready", subject=self._name)
             homes = action is StartupAction.HOME
@@ -292,16 +293,20 @@ class AdapterController:
             limit_s = self._settings.homing_timeout_s if homes else self._timeouts.command
             await self._do(link, _REQUESTS[action], limit_s)
             last = action
-        self._require_remote(status)
-        await self._require_rest(status)
         await self._require_place(link)
         self._unready, self._is_reloading = "", False
 
-    async def _require_rest(self, status: Status) -> None:
+    async def _undisturbed(self, link: Link) -> Status:
+        """Its status; raises ``DeviceError`` where somebody else commands it."""
+        status = await self._status(link)
+        if not status.remote:
+            action = "Switch it to remote, or to automatic, then prepare it again"
+            raise DeviceError("takes no commands from here", subject=self._name, action=action)
         if status.moving:
             await self.stop()
             action = "See that nobody else moves the robot, then prepare it again"
             raise errors.MotionInterrupted("moved without being asked", subject=self._name, action=action)
+        return status
 
     async def _require_place(self, link: Link) -> None:
         """Require that it is where it was before a reload."""
@@ -323,15 +328,10 @@ class AdapterController:
             return StartupAction.SWITCH_ON
         return None if status.homed else StartupAction.HOME
 
-    def _require_remote(self, status: Status) -> None:
-        if not status.remote:
-            action = "Switch it to remote, or to automatic, then prepare it again"
-            raise DeviceError("takes no commands from here", subject=self._name, action=action)
-
     async def _carry_out(self, link: Link, pose: Pose, duration_s: float, stops: int) -> None:
         """Move, and return at rest at the pose."""
         limit_s = 2.0 * duration_s + self._timeouts.beyond_move
-        start = self._here or pose_of((await self._position(link)).pose or list(pose.as_tuple()))
+        start = await self._start(link)
         self._here = None
         try:
             answer = await link.ask(
@@ -357,6 +357,20 @@ class AdapterController:
         if isinstance(answer, Failed):
             await self._raise_failure(link, answer, start, pose, stops)
         await self._verify(link, pose, stops)
+
+    async def _start(self, link: Link) -> Pose:
+        """Where it stands before a move: where the last one left it."""
+        here = (await self._position(link)).pose
+        if here is not None and (
+            self._here is None or agree(pose_of(here), self._here, self._settings, _LEFT_TOLERANCES)
+        ):
+            return pose_of(here)
+        where = "nowhere" if here is None else f"at {pose_of(here)}"
+        raise errors.MotionInterrupted(
+            f"is {where}, and was left at {self._here}: it moved without a command",
+            subject=self._name,
+            action="Find out what moved it, then prepare it again",
+        )
 
     async def _raise_failure(
         self, link: Link, failed: Failed, start: Pose, target: Pose, stops: int
@@ -388,17 +402,22 @@ class AdapterController:
 
     async def _verify(self, link: Link, pose: Pose, stops: int) -> None:
         """Require that it rests at a pose; it is stopped where it does not."""
-        status, found = await self._status(link), await self._position(link)
-        there = None if found.pose is None else pose_of(found.pose)
-        if not status.moving and there is not None and agree(there, pose, self._settings):
-            return
+        deadline = _now() + self._timeouts.arrival
+        while True:
+            status, found = await self._status(link), await self._position(link)
+            there = None if found.pose is None else pose_of(found.pose)
+            if not status.moving and there is not None and agree(there, pose, self._settings):
+                return
+            if status.moving or _now() > deadline:
+                break
+            await asyncio.sleep(self._timeouts.poll)
         was_stopped = self._stop_count != stops
         await self.stop()
         if was_stopped:
             self._unready = ""
         raise errors.MotionInterrupted(
-            f"is {'moving' if status.moving else 'at rest'} at {there}, not at rest at {pose}, after "
-            f"{'it was stopped' if was_stopped else 'it said that the move was over'}",
+            f"{'moves' if status.moving else 'rests'} at {there or 'no known place'}, and does not rest at "
+            f"{pose}, after {'it was stopped' if was_stopped else 'it said that the move was over'}",
             subject=self._name,
             action="Find out why, then prepare it and measure this pose again",
         )

@@ -58,6 +58,7 @@ class Timeouts:
     connect: float = 30.0
     answer: float = 5.0
     command: float = 20.0
+    arrival: float = 1.0
     reload: float = 120.0
     reconnect: float = 60.0
     beyond_move: float = 10.0
@@ -201,10 +202,11 @@ class Link:
                     await self._process.wait()
             except TimeoutError:
                 _log.warning("%s: did not end with its stdin, and was killed", self._program.name)
-            finally:
-                with suppress(ProcessLookupError, PermissionError):
+                with suppress(ProcessLookupError):
                     os.killpg(self._process.pid, signal.SIGKILL)
-            await self._process.wait()
+                with suppress(TimeoutError):  # what it has started elsewhere may hold its pipes open
+                    async with asyncio.timeout(self._timeouts.closing):
+                        await self._process.wait()
         else:
             self._writer.transport.abort()
         for task in self._tasks:
@@ -283,7 +285,7 @@ class Link:
                 self._record(TrafficDirection.RECEIVED, line)
                 if problem := self._take(line):
                     self.fail(problem)
-                    return
+                    break
         except asyncio.LimitOverrunError:
             self.fail(f"sent a line of more than {LONGEST_LINE} bytes")
         except (asyncio.IncompleteReadError, OSError) as end:
@@ -291,6 +293,9 @@ class Link:
             self._record(TrafficDirection.RECEIVED, rest)
             self._writer.close()
             self.fail(await self._end() + (f", in the middle of a line: {_shown(rest)}" if rest else ""))
+        with suppress(OSError):  # a program that waits for its reader would not see that its stdin ended
+            while await self._reader.read(_CHUNK):
+                pass
 
     def _take(self, line: bytes) -> str | None:
         """Hand an answer to who waits for it; what is wrong with it, if anything is."""
@@ -299,6 +304,8 @@ class Link:
         except ValidationError as refusal:
             return f"sent {_shown(line)}, which is no answer: {first_mistake(refusal, 'the line')}"
         if (request := self._pending.get(answer.id)) is None:
+            if answer.at is not None:
+                return f"is on its way after it said that request {answer.id} was over: {_shown(line)}"
             return f"answers request {answer.id}, which was answered before or never asked: {_shown(line)}"
         if answer.at is not None:
             return request.on_way(pose_of(answer.at))

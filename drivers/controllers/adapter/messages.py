@@ -35,7 +35,7 @@ class Hello(Message):
     length: Told
     angle: Told
     name: Told
-    description: Told
+    description: Told = ""
     serial_number: Told = ""
 
 
@@ -55,7 +55,7 @@ class Position(Message):
     """Where the robot is, as far as it is known."""
 
     pose: Coordinates | None
-    joints: Coordinates | None
+    joints: Coordinates | None = None
 
 
 class Failed(Message):

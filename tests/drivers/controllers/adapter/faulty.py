@@ -5,7 +5,8 @@ import itertools
 import sys
 from pathlib import Path
 
-from drivers.controllers.adapter.controller import AdapterController, Timeouts
+from drivers.controllers.adapter.controller import AdapterController
+from drivers.controllers.adapter.link import Timeouts
 from drivers.controllers.adapter.options import Program
 from drivers.errors import MoveRefused
 from drivers.interfaces import StartupAction
@@ -70,8 +71,6 @@ async def whole_job(controller: AdapterController, log: Path) -> DeviceError | N
         await controller.reload(frozenset())
         await controller.move(TARGETS[2], 0.05)
     except DeviceError as error:
-        assert error.subject == "controller faulty", error
-        assert "sesame" not in str(error)
         await _require_rest(controller, log, error)
         return error
     finally:
@@ -80,7 +79,9 @@ async def whole_job(controller: AdapterController, log: Path) -> DeviceError | N
 
 
 async def _require_rest(controller: AdapterController, log: Path, error: DeviceError) -> None:
-    """It is at rest, at the latest when it is told to stop, and stays so until it was prepared."""
+    """It is named, and at rest, at the latest when it is told to stop, until it is prepared."""
+    assert error.subject == "controller faulty", error
+    assert "sesame" not in str(error)
     try:
         await controller.stop()
     except DeviceError:

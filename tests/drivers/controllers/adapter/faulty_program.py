@@ -34,7 +34,7 @@ def say(number, **answer):
 
 
 def move(number, target, duration_s):
-    global pose
+    global pose  # noqa: PLW0603
     start, steps = pose, max(2, int(duration_s / 0.01))
     state["moving"] = True
     note("move")
@@ -87,7 +87,7 @@ def answer(request):
             return
         done = {}
     else:
-        done = done_of(request)
+        done = done_of({**request, "do": ""} if fault == "no effect" else request)
     send = FAULTS.get(str(fault), lambda number, done: say(number, done=done))
     send(number, done)
     if fault == "early":
@@ -99,7 +99,7 @@ def line(text):
 
 
 def jump(number, done):
-    global pose
+    global pose  # noqa: PLW0603
     say(number, done=done)
     pose = [value + 5.0 for value in pose]
 
@@ -111,6 +111,7 @@ FAULTS = {
     "empty": line(""),
     "nan": line('{"id": ID, "done": {"pose": [NaN, 0, 0, 0, 0, 0], "joints": null}}'),
     "infinite": line('{"id": ID, "at": [1e999, 0, 0, 0, 0, 0]}'),
+    "aside": line('{"id": ID, "at": [300, 0, 0, 0, 0, 0]}'),
     "five numbers": line('{"id": ID, "at": [0, 0, 0, 0, 0]}'),
     "no answer in it": line('{"id": ID}'),
     "two answers in it": line('{"id": ID, "done": {}, "failed": {"kind": "fault", "reason": "x"}}'),
@@ -143,7 +144,7 @@ FAULTS = {
         for kind in ("pose", "refused", "interrupted", "fault")
     },
 }
-NAMES = ("silence", "early", *FAULTS)
+NAMES = ("silence", "early", "no effect", *FAULTS)
 
 if __name__ == "__main__":
     for request in map(json.loads, sys.stdin):

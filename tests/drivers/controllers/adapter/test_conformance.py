@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from drivers import conformance
-from drivers.controllers.adapter.controller import AdapterController, Timeouts
+from drivers.controllers.adapter.controller import AdapterController
+from drivers.controllers.adapter.link import Timeouts
 from drivers.controllers.adapter.options import AdapterOptions
 from drivers.interfaces import Controller, StartupAction
 from drivers.simulated.linuxcnc.server import SimulatedController
@@ -75,7 +76,7 @@ async def test_the_example_without_help_is_a_controller_too(minimal: str) -> Non
 async def test_a_second_client_of_a_server_moves_nothing(minimal: str) -> None:
     first, second = (AdapterController(settings_of(address=minimal), timeouts=FEW) for _ in range(2))
     await first.open()
-    with pytest.raises(DeviceError, match=f"controller {minimal}: has not answered 'hello'"):
+    with pytest.raises(DeviceError, match=f"controller {minimal}: is frozen: it did not answer 'hello'"):
         await second.open()
     await first.prepare(frozenset(StartupAction))
     await asyncio.gather(first.close(), second.close())

@@ -1,4 +1,4 @@
-"""A program that lies, hangs, dies or talks nonsense is named, the robot stopped, and nothing moves after it."""
+"""A program that lies, hangs, dies or talks nonsense is named, and its robot rests until it is prepared."""
 
 import random
 from pathlib import Path
@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 
 from drivers.errors import (
+    CommandRefused,
     ConnectionLost,
     MotionInterrupted,
     MoveRefused,
     PoseRefused,
     ResponseTimeout,
     StartupNotPermitted,
-    WrongAnswer,
 )
 from hexacell.errors import DeviceError
 from tests.drivers.controllers.adapter.faulty import ALL, EVERY, TARGETS, done_by, driver, whole_job
@@ -42,27 +42,29 @@ async def test_without_a_fault_the_whole_job_is_done(log: Path) -> None:
 @pytest.mark.parametrize(
     ("fault", "at", "kind", "words"),
     [
-        ("silence", "move", ResponseTimeout, "has not answered 'move' after"),
-        ("silence", "status", ResponseTimeout, "has not answered 'status'"),
-        *((nonsense, "status", WrongAnswer, "does not belong to the protocol") for nonsense in NONSENSE),
-        ("long", "position", WrongAnswer, "more than 65536 bytes"),
-        ("endless", "position", WrongAnswer, "more than 65536 bytes"),
-        ("nan", "position", WrongAnswer, "belong"),
-        ("infinite", "move", WrongAnswer, "belong"),
-        ("another number", "status", WrongAnswer, "no request of this number waits"),
-        ("twice", "move", DeviceError, ""),
-        ("inch", "hello", WrongAnswer, "length: Input should be 'mm'"),
-        ("version 2", "hello", WrongAnswer, "version: Input should be 1"),
+        ("silence", "move", MotionInterrupted, "was still moving after"),
+        ("silence", "status", ResponseTimeout, "did not answer 'status'"),
+        *((nonsense, "status", ConnectionLost, "which is no answer") for nonsense in NONSENSE),
+        ("long", "position", ConnectionLost, "more than 65536 bytes"),
+        ("endless", "position", ConnectionLost, "more than 65536 bytes"),
+        ("nan", "position", ConnectionLost, "finite number"),
+        ("infinite", "move", ConnectionLost, "finite number"),
+        ("aside", "move", ConnectionLost, "is not on the way from"),
+        ("another number", "status", ConnectionLost, "answered before or never asked"),
+        ("twice", "move", ConnectionLost, "answered before or never asked"),
+        ("inch", "hello", DeviceError, "counts in 'inch', not in mm"),
+        ("version 2", "hello", DeviceError, "has version 2 of the adapter protocol"),
         ("not remote", "status", DeviceError, "takes no commands from here"),
-        ("early", "move", MotionInterrupted, "is done, and still moves"),
-        ("elsewhere", "position", MotionInterrupted, "says that it is at"),
-        ("nowhere", "position", MotionInterrupted, "does not know where it is"),
-        ("half", "move", ConnectionLost, "ended with code 0"),
-        ("exit", "home", ConnectionLost, "ended with code 3: out of oil"),
+        ("early", "move", DeviceError, ""),
+        ("elsewhere", "position", MotionInterrupted, "after it said that the move was over"),
+        ("nowhere", "position", DeviceError, "does not know where it is"),
+        ("no effect", "home", DeviceError, "'home' is done, which had no effect"),
+        ("half", "move", ConnectionLost, "in the middle of a line"),
+        ("exit", "home", ConnectionLost, "ended with exit status 3: out of oil"),
         ("pose", "move", PoseRefused, "so it is"),
         ("refused", "move", MoveRefused, "so it is"),
-        ("interrupted", "move", MotionInterrupted, "was interrupted: so it is"),
-        ("fault", "switch-on", DeviceError, "failed at 'switch-on': so it is"),
+        ("interrupted", "move", MotionInterrupted, "before reaching X5.000"),
+        ("fault", "switch-on", CommandRefused, "refuses 'switch-on': so it is"),
         ("refused", "hello", DeviceError, "so it is"),
     ],
 )
@@ -78,7 +80,7 @@ async def test_a_flood_on_stderr_harms_nothing(log: Path) -> None:
 
 
 async def test_a_robot_that_moved_by_itself_does_not_move_before_it_is_prepared(log: Path) -> None:
-    error = await whole_job(driver(log, "jump", "position", nth=2), log)
+    error = await whole_job(driver(log, "jump", "position", nth=4), log)
     assert isinstance(error, MotionInterrupted)
     assert "it moved without a command" in error.problem
 

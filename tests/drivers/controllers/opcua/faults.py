@@ -111,6 +111,8 @@ def moved_in_spite_of(
             told = str(failure)
         else:
             assert astuple(plc.machine.pose()) == FAR
+        if NO_LINK in told:  # what was on its way may begin yet, until the PLC misses its client
+            wait_until(lambda: plc.program.is_late)
         wait_until(lambda: plc.stands or not plc.program.outputs["moving"])
         at_rest = plc.machine.pose()
         repair(plc)

@@ -53,6 +53,8 @@ class PlcProgram:
         self._job: Future[None] | None = None
         self._executed = self._is_stopped = False
         self._client, self._client_s = 0, time.monotonic()
+        self._too_late: int | None = None
+        self.is_late = False
         self._motion = ThreadPoolExecutor(1, thread_name_prefix="PLC motion")
 
     def cycle(self, seen: dict[str, Any]) -> None:
@@ -60,7 +62,10 @@ class PlcProgram:
         out = dict(self.outputs, heartbeat=self.outputs["heartbeat"] % 32767 + 1)
         if seen["client_heartbeat"] != self._client:
             self._client, self._client_s = seen["client_heartbeat"], time.monotonic()
-        may_move = not (seen["stop"] or out["estop"] or time.monotonic() - self._client_s > CLIENT_S)
+        if time.monotonic() - self._client_s > CLIENT_S:
+            self._too_late = seen["number"]
+        self.is_late = seen["number"] == self._too_late
+        may_move = not (seen["stop"] or out["estop"] or self.is_late)
         if seen["execute"] and not self._executed and self._job is None:
             out.update(
                 answered=seen["number"], busy=True, done=False, error=False, error_number=0, error_text=""
@@ -149,6 +154,7 @@ class PlcServer(Closeable):
         self.program = PlcProgram(machine)
         self.forced: dict[str, ua.DataValue] = {}
         self.cycle_s, self.stands = CYCLE_S, False
+        self._cycle = threading.Lock()
         self._types = TYPES | {Kind.REAL: real, Kind.SIX: real}
         self._folder, self._users = folder, users
         self._answering, self._closing = threading.Event(), threading.Event()
@@ -179,10 +185,11 @@ class PlcServer(Closeable):
     def restart(self, machine: Machine | None = None) -> None:
         """As after a loss of power, perhaps at another machine: all that was written is lost."""
         self.set_unplugged(on=True)
-        self.program.close()
-        self.machine = machine or self.machine
-        self.program = PlcProgram(self.machine)
-        self.write(**{name: ZEROS.get(NODES[name], [0.0] * 6) for name in INPUTS})
+        with self._cycle:
+            self.program.close()
+            self.machine = machine or self.machine
+            self.program = PlcProgram(self.machine)
+            self.write(**{name: ZEROS.get(NODES[name], [0.0] * 6) for name in INPUTS})
         self.set_unplugged(on=False)
 
     def stand(self) -> None:
@@ -259,9 +266,10 @@ class PlcServer(Closeable):
 
     def _work(self) -> None:
         while not self._closing.wait(self.cycle_s):
-            if not self.stands:
-                seen = {name: self._server.read_attribute_value(self._id(name)) for name in INPUTS}
-                self.program.cycle({name: one.Value.Value for name, one in seen.items() if one.Value})
+            with self._cycle:
+                if not self.stands:
+                    seen = {name: self._server.read_attribute_value(self._id(name)) for name in INPUTS}
+                    self.program.cycle({name: one.Value.Value for name, one in seen.items() if one.Value})
 
     def _do(self, work: Any) -> Any:
         return asyncio.run_coroutine_threadsafe(work, self._loop).result()

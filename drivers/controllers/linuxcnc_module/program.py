@@ -28,6 +28,7 @@ POLL_S = 0.005
 REPORT_S = 0.05
 COMMAND_S, SWITCH_S, REST_S = 20.0, 5.0, 5.0
 OFFSET = 1e-6
+MOST_REQUESTS = 2
 TASK = "milltask"
 """The program that is LinuxCNC's task; what it says of itself stays readable when it is gone."""
 AXES = 6
@@ -112,7 +113,7 @@ class Machine:
             self._done(self._command.teleop_enable, 0)
             self._command.home(-1)
             self._until(self._is_homed, None, "is not homed")
-            self._done(self._command.mode, linuxcnc.MODE_MDI)
+            self._enter_mdi_mode()
 
     def move(self, pose: Sequence[float], duration_s: float, report: Report) -> None:
         """Move by one block in inverse time; the modes are then what they were."""
@@ -121,8 +122,7 @@ class Machine:
         if not self._is_on(stat) or not self._is_homed(stat):
             raise FailedError("refused", "it is switched off or not homed")
         self._require_own_coordinates(stat)
-        if stat.task_mode != linuxcnc.MODE_MDI:
-            self._done(self._command.mode, linuxcnc.MODE_MDI)
+        self._enter_mdi_mode()
         self._take_errors()
         with self._modes_restored(stat):
             self._command.mdi(gcode.timed_move(pose, duration_s))
@@ -180,6 +180,15 @@ class Machine:
         command(*arguments)
         if self._command.wait_complete(COMMAND_S) == linuxcnc.RCS_ERROR:
             raise FailedError("fault", self._take_errors() or "it refuses a command")
+
+    def _enter_mdi_mode(self) -> None:
+        """What is asked for while homing ends may have no effect, so it is asked for again."""
+        for _ in range(MOST_REQUESTS):
+            if self._polled().task_mode == linuxcnc.MODE_MDI:
+                return
+            self._done(self._command.mode, linuxcnc.MODE_MDI)
+            self._wait(lambda stat: stat.task_mode == linuxcnc.MODE_MDI, SWITCH_S / MOST_REQUESTS)
+        raise FailedError("fault", f"does not enter MDI mode: {self._take_errors() or 'no reason'}")
 
     def _switched(self, state: int, is_so: Callable[[Any], bool], problem: str) -> None:
         self._command.state(state)

@@ -6,14 +6,14 @@ from drivers.controllers.adapter.controller import AdapterController
 from drivers.controllers.adapter.options import Program
 from drivers.controllers.opcua.options import OpcUaOptions
 from drivers.errors import optional
-from hexacell.cell.robot import ControllerSettings
+from hexacell.cell.robot import ControllerOptions, ControllerSettings
 from hexacell.python_process import python_command
 
 
 class OpcUaController(AdapterController):
     """``drivers.interfaces.Controller`` of a PLC with an OPC UA server."""
 
-    Options = OpcUaOptions  # type: ignore[assignment]
+    Options: type[ControllerOptions] = OpcUaOptions
 
     def __init__(self, settings: ControllerSettings, **named: Any) -> None:  # noqa: ANN401 - its base's
         options = cast("OpcUaOptions", settings.options)

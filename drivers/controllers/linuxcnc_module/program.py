@@ -290,10 +290,12 @@ def _processes(name: str) -> Iterator[int]:
 
 
 def _is_running(process: int, name: str = TASK) -> bool:
+    """Whether there is such a process that has not ended: what is left of one has the state Z."""
     try:
-        return Path(f"/proc/{process}/comm").read_text().strip() == name
+        said = Path(f"/proc/{process}/stat").read_text()
     except OSError:
         return False
+    return f"({name})" in said and said.rpartition(")")[2].split()[0] != "Z"
 
 
 def _end(problem: str) -> None:

@@ -16,6 +16,7 @@ from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
 from tests.linuxcnc.conftest import LinuxCNC
+from tests.linuxcnc.server_client import ServerClient
 from tests.linuxcnc.test_calibration import RUN, require_passed, shorten, written
 
 pytestmark = pytest.mark.timeout(1200)
@@ -38,6 +39,13 @@ async def driver(linuxcnc: LinuxCNC) -> AsyncIterator[LinuxcncController]:
     await made.open()
     yield made
     await made.close()
+
+
+def send(client: ServerClient, block: str) -> None:
+    """Have linuxcncrsh send a block; what it knows of the machine is what it was asked for last."""
+    assert client.ask("get machine") == "MACHINE ON"
+    for command in ("set mode mdi", f"set mdi {block}"):
+        assert "ACK" in client.ask(command)
 
 
 async def is_at(driver: Controller, pose: Pose) -> bool:
@@ -98,8 +106,7 @@ async def test_what_it_refuses_is_named_with_its_axis(driver: LinuxcncController
 async def test_what_changes_coordinates_is_refused(linuxcnc, driver, block) -> None:
     await driver.prepare(ALL)
     with linuxcnc.connect() as client:
-        for command in ("set mode mdi", f"set mdi {block}"):
-            assert "ACK" in client.ask(command)
+        send(client, block)
     with pytest.raises(DeviceError, match=r"offset|relative"):
         await driver.move(THERE, MOVE_S)
 
@@ -107,8 +114,7 @@ async def test_what_changes_coordinates_is_refused(linuxcnc, driver, block) -> N
 async def test_a_program_in_inches_stays_in_inches(linuxcnc, driver) -> None:
     await driver.prepare(ALL)
     with linuxcnc.connect() as client:
-        for command in ("set mode mdi", "set mdi G20"):
-            assert "ACK" in client.ask(command)
+        send(client, "G20")
         await driver.move(THERE, MOVE_S)
         assert await is_at(driver, THERE)
         assert "G20" in client.ask("get program_codes").split()

@@ -184,6 +184,7 @@ class AdapterController:
             if command := self._settings.reload_command:
                 await run_reload_command(command, self._name, self._timeouts.reload)
                 link.fail("was started anew")
+                self._was_enabled = False  # it may be in the emergency stop that it starts in
                 link = await self._reconnected()
             else:
                 await self._do(link, "reload", self._timeouts.reload)

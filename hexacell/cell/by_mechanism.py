@@ -9,11 +9,12 @@ here they are derived for deg, with other keys and defaults, and nothing else ch
 
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from copy import copy
 from functools import cache
 from typing import Any, TypeVar
 
-from pydantic import Field, create_model
+from pydantic import Field, ValidationError, create_model
 from pydantic_core import PydanticUndefined
 
 from hexacell.cell.devices import EncoderSettings, LinearEncoderSettings, RotaryEncoderSettings
@@ -124,8 +125,9 @@ def cell_model(
 def _options_field(options: type[ControllerOptions]) -> tuple[type[ControllerOptions], Any]:
     """A key of the controller's section, which may be left away if all options may."""
     field = copy(ControllerSettings.model_fields["options"])
-    needed = any(one.is_required() for one in options.model_fields.values())
-    field.default = PydanticUndefined if needed else options()
+    field.default = PydanticUndefined
+    with suppress(ValidationError):  # some are needed
+        field.default = options()
     return options, field
 
 

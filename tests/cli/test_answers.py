@@ -150,13 +150,13 @@ def test_all_that_is_wrong_is_named_at_once_and_nothing_is_written(typed_here, t
     told = " ".join(refused.err.split())
     for words in (
         "answers.toml:2: config: ",
-        "answers.toml:3: tolerance: 'B_mm' in [tolerances] is -1.0, but must be more than 0",
+        "answers.toml:3: tolerance: 'S_mm' in [tolerances] is -1.0, but must be more than 0",
         "answers.toml: options.address is missing",
-        "answers.toml:13: options.rate: 'rate' in [controller.options] is 20, but must be 9 or less",
-        "answers.toml:15: options.password: 'password' in [controller.options] must be text",
+        "answers.toml:14: options.rate: 'rate' in [controller.options] is 20, but must be 9 or less",
+        "answers.toml:16: options.password: 'password' in [controller.options] must be text",
         "answers.toml:5: joints: 2 numbers are expected",
-        "answers.toml:10: gauges.x.protocol: it is one of cdi,",
-        "answers.toml:11: gauges.x.sign: answer yes or no",
+        "answers.toml:11: gauges.x.protocol: it is one of cdi,",
+        "answers.toml:12: gauges.x.sign: answer yes or no",
         "answers.toml: gauges.y.port is missing",
         "answers.toml:6: nodes: '6.5' is no whole number",
         "answers.toml:7: plates: 'yes' is no number",

@@ -21,7 +21,7 @@ from hexacell.errors import AnswerNeeded, ExitCode, UsageError
 from hexacell.services.devices.device_diagnosis import diagnose
 from hexacell.services.devices.device_search import draft_of, search_devices
 from hexacell.services.devices.first_cell import CellDraft
-from hexacell.storage.atomic_files import read_text, require_creatable
+from hexacell.storage.atomic_files import os_errors, read_text, require_creatable
 from hexacell.storage.output_files import NEW_ANSWERS, OutputFile
 from hexacell.storage.toml_document import TomlDocument
 from hexacell.text import found_devices
@@ -90,9 +90,11 @@ def _require_answers(options: argparse.Namespace) -> TomlDocument | None:
         if path is None and not is_interactive():
             action = "Start it at a terminal, or name a file of answers with --answers"
             raise AnswerNeeded("--write asks what no device reports", action=action)
-    if path is None or not path.exists():
+    if path is None:
         return None
-    return TomlDocument.parse(read_text(path, LARGEST_FILE_BYTES), path)
+    with os_errors("cannot be read", path):
+        is_new = not path.exists()
+    return None if is_new else TomlDocument.parse(read_text(path, LARGEST_FILE_BYTES), path)
 
 
 def _write(draft: CellDraft, file: Path | None, answers: TomlDocument | None, console: Console) -> ExitCode:

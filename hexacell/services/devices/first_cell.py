@@ -152,7 +152,7 @@ class CellDraft:
             # What it says of this answer, or of its section, by their lines; if no answer is missing there.
             section = answer.path[:-1]
             lines = {document.line_of(answer.path)}
-            needed = (one for one in answers if not (one.default or one.is_optional))
+            needed = (one for one in answers if one.is_asked and not one.default)
             if all(one.name in draft.given or one.path[: len(section)] != section for one in needed):
                 lines.add(document.line_of(section))
             for one in flatten_errors(error):

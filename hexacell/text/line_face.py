@@ -139,7 +139,7 @@ def whole_event_text(event: events.Event, state: RunState) -> str | None:
         case events.NoiseMeasured():
             noise = measured_noise_text(event.noise, with_averaging=True)
             pilots = len(state.set(event.at).pilots)
-            meanwhile = f"meanwhile {pilots} pilot poses were read, by which the next ones are chosen"
+            meanwhile = f"meanwhile {pilots} preliminary poses were read, by which the next ones are chosen"
             return f"{noise}\n{meanwhile}" if pilots else noise
         case events.Identified(quick=quick, reversal=reversal, worsening=worse):
             known = "" if quick is None else f"quick level: {quick_accuracy_sentences(quick)}"

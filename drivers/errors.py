@@ -70,7 +70,7 @@ def invalid_sample(what: str, subject: str, action: str) -> InvalidSampleError:
 
 def silent_encoder(what: str, subject: str, remedy: str) -> SilentNodeError:
     """The error for an encoder that does not answer; ``remedy`` is what to do before it is opened again."""
-    action = f"{remedy}, then open the encoders again; the set that was being measured is void"
+    action = f"{remedy}, then try again; the set that was being measured is void"
     return SilentNodeError(what, subject=subject, action=action)
 
 

@@ -194,7 +194,7 @@ class EncoderBus:
         return BusError(
             f"{what}: {_text(cause)}",
             subject=self.name,
-            action=f"{advice_on(cause) or CHECK_BUS}, then open the encoders again; the set that was being "
+            action=f"{advice_on(cause) or CHECK_BUS}, then try again; the set that was being "
             "measured is void",
         )
 

@@ -83,8 +83,7 @@ class EncoderNode:
                 return None
             raise self.leg.error(
                 f"refuses {TIMES_ASKED} times to read {entry}: {error}",
-                "Switch it off and on, then open the encoders again; if it stays so, look the code "
-                "up in its manual",
+                "Switch it off and on, then try again; if it stays so, look the code up in its manual",
             ) from error
 
     def write(self, entry: ObjectEntry, value: int) -> None:
@@ -120,7 +119,7 @@ class EncoderNode:
             return silent_nodes(f"does not respond for {entry}: {error}", [self.leg])
         return self.leg.error(
             f"does not respond as it should for {entry}, but {self.sdo.latest.hex(' ')}: {error}",
-            "End other programs that ask it, then open the encoders again, or use another device",
+            "End other programs that ask it, then try again, or use another device",
         )
 
 
@@ -133,7 +132,7 @@ def duplicated_node(what: str, leg: Leg) -> DeviceError:
     """The error for a node id that two devices share."""
     return leg.error(
         f"{what}: two devices share node id {leg.node}, another program uses this bus, or it answers late",
-        "Unplug one, give it another node id, or raise timeout_s, then open the encoders again",
+        "Unplug one, give it another node id, or raise timeout_s, then try again",
     )
 
 

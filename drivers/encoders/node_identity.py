@@ -57,7 +57,7 @@ def detect_nodes(nodes: Sequence[EncoderNode], bus: EncoderBus, timeout_s: float
         action = f"Check {where} and node id"
         if len(odd) == len(missing):
             hint += "; it sends, but no answer of eight bytes to SDO requests"
-            action = "Open the encoders again, it may just have started; else set it with its vendor's tool"
+            action = "Try again, it may just have started; else set it with its vendor's tool"
         told = f"no device responds{hint}{bus.reported}"
         raise BusError(told, subject=subject_of([node.leg for node in missing]), action=action)
 

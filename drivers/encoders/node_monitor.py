@@ -37,14 +37,14 @@ _ACTIONS = {
     "2": "Check its cable for a short circuit, then measure again",
     "3": "Check the voltage of its supply at the encoder, then measure again",
     "4": "Let it cool, or warm up, and see what heats it; then measure again",
-    **dict.fromkeys("56", "Switch it off and on, then open the encoders again; if it stays so, replace it"),
-    "8": "Open the encoders again; if it stays so, set the node with its vendor's tool",
-    "81": "Check cable, termination and bit rate of the bus, then open the encoders again",
-    "8130": "Open the encoders again; if it stays so, switch its heartbeat consumer (1016h) off",
-    "8150": "Give each device on the bus a node id of its own, then open the encoders again",
+    **dict.fromkeys("56", "Switch it off and on, then try again; if it stays so, replace it"),
+    "8": "Try again; if it stays so, set the node with its vendor's tool",
+    "81": "Check cable, termination and bit rate of the bus, then try again",
+    "8130": "Try again; if it stays so, switch its heartbeat consumer (1016h) off",
+    "8150": "Give each device on the bus a node id of its own, then try again",
     **dict.fromkeys(("FF00", "m"), "Remove the cause (magnet, distance, dirt, heat), then measure again"),
-    "b": "Change its battery, then open the encoders again",
-    "o": "It is old: replace it soon; until then open the encoders again",
+    "b": "Change its battery, then try again",
+    "o": "It is old: replace it soon; for now try again",
     "s": "State a lower speed in [speed], then measure again",
 }
 """By how the code of an emergency begins (CiA 301, table of error codes), and by what bits mean."""
@@ -139,7 +139,7 @@ def check_nodes(monitors: Sequence[NodeMonitor]) -> None:
         raise RestartedNodeError(
             "restarted, or was stopped, during the run and lost its configuration: the set is void",
             subject=subject_of(restarted),
-            action="Check its supply, open the encoders again and repeat the set",
+            action="Check its supply, then repeat the set",
         )
     silent = [monitor for monitor in monitors if monitor.is_silent(now_s)]
     if silent:

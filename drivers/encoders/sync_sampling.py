@@ -205,7 +205,7 @@ class SyncSampler:
             index = self._counts.index(None)
             raise self.legs[index].error(
                 f"sent {self._lengths[index]} bytes where its position needs {self.channels[index].length}",
-                "Open the encoders again; if it stays so, use another device",
+                "Try again; if it stays so, use another device",
             )
         return counts
 

@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from drivers.controllers.adapter.served_robot import FailedError, Report, Told, serve
-from drivers.controllers.linuxcnc.protocol import parse_pose_refusal
+from drivers.controllers.linuxcnc.gcode import parse_pose_refusal
 from drivers.simulated.linuxcnc.server import SimulatedController
 from drivers.simulated.linuxcnc.state import ConnectionCut, ControllerState, Machine, TaskMode
 from hexacell.cell.robot import ControllerSettings

@@ -9,6 +9,7 @@ here they are derived for deg, with other keys and defaults, and nothing else ch
 
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from copy import copy
 from functools import cache
 from typing import Any, TypeVar
@@ -124,10 +125,9 @@ def cell_model(
 def _options_field(options: type[ControllerOptions]) -> tuple[type[ControllerOptions], Any]:
     """A key of the controller's section, which may be left away if all options may."""
     field = copy(ControllerSettings.model_fields["options"])
-    try:
+    field.default = PydanticUndefined
+    with suppress(ValidationError):  # some are needed
         field.default = options()
-    except ValidationError:  # some are needed
-        field.default = PydanticUndefined
     return options, field
 
 

@@ -86,14 +86,14 @@ def config_paths(settings: CellSettings, folder: Path) -> tuple[Path, ...]:
     return (folder / controller.config, *(folder / one.config for one in controller.further_files))
 
 
-def load_cell(path: Path) -> Cell:
+def load_cell(path: Path | str) -> Cell:
     """The cell of a TOML file: settings with every default filled in, and the text with all lines.
 
     Raises:
         FileError: it cannot be read, is no TOML, or has one mistake.
         SeveralErrors: it has more than one; each of ``errors`` is a FileError with its line.
     """
-    return checked_cell(path, read_text(path, LARGEST_FILE_BYTES))
+    return checked_cell(Path(path), read_text(Path(path), LARGEST_FILE_BYTES))
 
 
 def checked_cell(path: Path, text: str) -> Cell:

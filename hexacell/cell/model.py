@@ -18,7 +18,7 @@ from hexacell.cell.limits import (
     SpeedSettings,
 )
 from hexacell.cell.recovery import RecoverySettings
-from hexacell.cell.robot import ControllerSettings, RobotSettings
+from hexacell.cell.robot import ControllerOptions, ControllerSettings, RobotSettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.cell.uncertainty import CommonUncertaintySettings, LengthCheckSettings, ModelSettings
 from hexacell.kinematics.commanded_motion import RefusedCommands
@@ -206,11 +206,16 @@ class CellSettings(Section):
             yield ("length_check",), broken_rule(problem, "Remove [length_check]")
 
     def _connections(self) -> Refusals:
-        """Real devices have an address."""
+        """Real devices have an address; that of a controller may be among options of its own."""
+        controller, options = self.controller, self.controller.options
         connections: list[tuple[KeyPath, str, object]] = [
             *((("gauges", n), "the gauge has no port", gauge.port) for n, gauge in enumerate(self.gauges)),
             (("encoders",), "the encoders have no bus", self.encoders.address),
-            (("controller",), "the controller has no port", self.controller.port),
+            (
+                ("controller",),
+                "the controller has no port",
+                controller.port if type(options) is ControllerOptions else options,
+            ),
         ]
         for place, problem, given in connections:
             if given is None and self.simulation is None:

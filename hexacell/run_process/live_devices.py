@@ -3,7 +3,7 @@
 import asyncio
 import math
 from collections import deque
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from collections.abc import AsyncGenerator, Awaitable, Callable, Sequence
 from contextlib import AsyncExitStack
 from statistics import stdev
 from typing import Any
@@ -77,7 +77,7 @@ def _age(shown: LiveValue[Any]) -> float | None:
     return None if math.isinf(shown.age_s) else shown.age_s
 
 
-async def watch_devices(cell: Cell) -> AsyncIterator[LiveSnapshot]:
+async def watch_devices(cell: Cell) -> AsyncGenerator[LiveSnapshot, None]:
     """What the devices show, at most ten times a second, until the iterator is closed; nothing moves.
 
     Raises:

@@ -162,5 +162,6 @@ class AssistantScreen(Screen[bool]):
         self.query_one("#first-hint", TextPanel).show(hint)
         self.query_one("#first-problem", TextPanel).show(assistant.problem, Urgency.ALARM)
         if not assistant.problem:
+            field.password = assistant.is_secret
             field.value = assistant.suggestion
             field.cursor_position = len(field.value)

@@ -163,7 +163,13 @@ class HistoryScreen(TabScreen):
     def draw(self, model: ScreenModel, has_effect: Callable[[str], bool]) -> None:
         """Show what is so now."""
         self.is_asked = model.question() is not None
-        super().draw(model, has_effect)
+        proposing = {one.name for one in model.runs or () if one.summary.has_proposal}
+
+        def has_effect_here(action: str) -> bool:
+            may_write = self.is_asked or self.query_one(widgets.ChoiceTable).chosen in proposing
+            return has_effect(action) and (may_write or action != "write")
+
+        super().draw(model, has_effect_here)
 
     async def action_about(self, what: str) -> None:
         """Do something about the run that is chosen."""

@@ -55,6 +55,7 @@ SERVED_MARK = b"# made by hexacell simulate, which replaces this file\n"
 SERVED_CELL = OutputKind("a cell file of `simulate`", re.compile(rb"\A" + re.escape(SERVED_MARK)))
 UNIT = OutputKind("a unit of systemd", re.compile(rb"\A# Written by `hexacell schedule` for "))
 NEW_CELL = OutputKind("a new cell file", None)
+NEW_ANSWERS = OutputKind("new answers", None)
 
 
 @dataclass(frozen=True, slots=True)

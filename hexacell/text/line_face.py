@@ -91,6 +91,10 @@ class EventFormatter:
                 forecast = wrapped(run_forecast_line(self._forecast), indent=2)
         return [text for text in (event_text(event, state), forecast) if text]
 
+    def story(self, event: events.Event, state: RunState) -> str:
+        """The same for whoever sees nothing else of the run: records and its end too."""
+        return "\n".join([*_own_words(event), *self.lines(event, state)])
+
     def status_text(self, expected: int) -> str:
         """Where the run is: what it does, how far it is, its last record, its accuracy and the time left.
 
@@ -135,7 +139,7 @@ def whole_event_text(event: events.Event, state: RunState) -> str | None:
         case events.NoiseMeasured():
             noise = measured_noise_text(event.noise, with_averaging=True)
             pilots = len(state.set(event.at).pilots)
-            meanwhile = f"meanwhile {pilots} pilot poses were read, by which the next ones are chosen"
+            meanwhile = f"meanwhile {pilots} preliminary poses were read, by which the next ones are chosen"
             return f"{noise}\n{meanwhile}" if pilots else noise
         case events.Identified(quick=quick, reversal=reversal, worsening=worse):
             known = "" if quick is None else f"quick level: {quick_accuracy_sentences(quick)}"
@@ -156,9 +160,8 @@ def run_story(entries: Iterable[Entry]) -> Iterator[tuple[Entry, str]]:
     formatter, state = EventFormatter(), RunState()
     for entry in entries:
         state = apply(state, entry.event)
-        lines = [*_own_words(entry.event), *formatter.lines(entry.event, state)]
-        if lines:
-            yield entry, "\n".join(lines)
+        if text := formatter.story(entry.event, state):
+            yield entry, text
 
 
 def story_text(entries: Iterable[Entry]) -> str:

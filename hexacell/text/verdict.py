@@ -15,11 +15,11 @@ from hexacell.verdict.length_check import LengthStatement
 from hexacell.verdict.verification import Verification, scale_words
 
 VERDICT_MEANINGS = {
-    Verdict.PASS: "The error and the guard band together are within the limit.",
-    Verdict.CONDITIONAL_PASS: "The error is within the limit, but not by the guard band.",
+    Verdict.PASS: "The error with its safety margin is within the limit.",
+    Verdict.CONDITIONAL_PASS: "The error is within the limit, but not by the safety margin.",
     Verdict.NOT_EVALUATED: "The records do not decide it.",
-    Verdict.CONDITIONAL_FAIL: "The error is above the limit, but not by the guard band.",
-    Verdict.FAIL: "The error is above the limit, also with the guard band taken off.",
+    Verdict.CONDITIONAL_FAIL: "The error is above the limit, but not by the safety margin.",
+    Verdict.FAIL: "The error is above the limit, also with the safety margin taken off.",
 }
 
 NAMED_SOURCES = 4

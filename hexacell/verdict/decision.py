@@ -102,7 +102,7 @@ class JudgedError(Frozen):
 
     def rule(self, unit: str) -> str:
         """The limit, and the guard band where it is named, in words."""
-        guard_band = f", guard band {self.guard_band}" if self.guard_band else ""
+        guard_band = f", safety margin {self.guard_band}" if self.guard_band else ""
         return f"limit {self.shown_in(unit).limit(self.limit)}{guard_band}"
 
     def sentence(self, unit: str) -> str:

@@ -83,7 +83,7 @@ class SetKey(Frozen):
         return SET_NAMES[self.phase].format(self.point)
 
     def pose_name(self, orientation: int) -> str:
-        """Display name of a pose of the set: ``point 2, orientation 3``, ``point 1, pilot pose 2``."""
+        """Display name of a pose: ``point 2, orientation 3``, ``point 1, preliminary pose 2``."""
         pilot = pilot_number(orientation)
-        pose = f"orientation {orientation}" if pilot is None else f"pilot pose {pilot}"
+        pose = f"orientation {orientation}" if pilot is None else f"preliminary pose {pilot}"
         return f"{self.name}, {pose}"

@@ -23,6 +23,7 @@ SAMPLES: dict[str, dict[str, tuple[int, int]]] = {
     "mutations": {"MUTATIONS": (60, 10_000)},
     "paper_study": {"DRAWS": (20, 20)},
     "peers": {"ROBOTS": (2, 6)},
+    "plc": {"FAULTY": (60, 1000), "MOVES": (40, 200)},
     "public_geometries": {"ROBOTS": (8, 100)},
     "quick_level": {"ROBOTS": (12, 100)},
     "recalibration": {"MACHINES": (4, 100)},

@@ -17,7 +17,13 @@ from hexacell.storage.atomic_files import write_own
 from hexacell.storage.output_files import EVENTS, LOG, METRICS, REPORT, OutputFile
 from tests.hexacell.services.proposed_runs import propose_run
 
-READ = {"devices --cell", "fit --measurements", "next --measurements", "report --compare"}
+READ = {
+    "devices --answers",
+    "devices --cell",
+    "fit --measurements",
+    "next --measurements",
+    "report --compare",
+}
 """Options that name files or folders which are read."""
 
 FOLDERS = {"demo --folder", "host --folder", "replay --export", "schedule --folder", "study --folder"}

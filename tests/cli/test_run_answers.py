@@ -52,7 +52,7 @@ class TestUnattendedRun:
         assert outcome.code == outcome.document["exit_code"] == 1
         document = outcome.document
         assert re.match(r"check: \d+ records at 2 points; position error at the task", document["line"])
-        assert document["line"].endswith(" mm (limit 0.3, guard band 1.5 U): fail")
+        assert document["line"].endswith(" mm (limit 0.3, safety margin 1.5 U): fail")
         assert document["verdict"] == document["check"]["verdict"] == "fail"
         assert document["check"]["earlier_run"] is None
         assert "the check starts from the drawing" in " ".join(outcome.err.split())

@@ -101,8 +101,8 @@ def test_a_wrong_answer_is_refused_with_its_reason(path: Path) -> None:
         ("port", "1.5", "'1.5' is no whole number"),
         ("joints", "5", "2 numbers are expected: the smallest and the largest position"),
         ("joints", "800 -800", "joint_m"),
-        ("protocol x", "foo", "it is one of cdi, digimatic-usb, heidenhain-nd"),
-        ("sign y", "perhaps", "answer yes or no"),
+        ("gauges.x.protocol", "foo", "it is one of cdi, digimatic-usb, heidenhain-nd"),
+        ("gauges.y.sign", "perhaps", "answer yes or no"),
         ("nodes", "1 1 2 3 4 5", "two encoders have the same node id"),
         ("bus", "can0", "name the interface and the channel"),
         ("points", "1 2", "4 numbers are expected"),
@@ -115,7 +115,7 @@ def test_a_gauge_that_is_found_is_taken(path: Path, protocol: str) -> None:
     found = FoundGauge(protocol, "/dev/ttyUSB7", "one", channel=3, shown="+1.2345", baudrate=19200)
     findings = SearchFindings((), (PortFindings(found.port, (found,)),), (), None)
     draft = draft_of(findings, path)
-    assert draft.problem("protocol x", draft.given["protocol x"]) == ""
+    assert draft.problem("gauges.x.protocol", draft.given["gauges.x.protocol"]) == ""
     draft.write()
     gauge = load_cell(path).settings.gauges[0]
     assert (gauge.protocol, gauge.port, gauge.channel) == (protocol, "/dev/ttyUSB7", 3)
@@ -135,6 +135,6 @@ def test_points_out_of_reach_leave_no_file_and_a_sign_is_asked_in_words(path: Pa
     with pytest.raises(HexacellError, match="stated poses are out of reach"):
         draft.write()
     assert not path.exists()
-    draft = CellDraft(path, {"sign z": "no"})
+    draft = CellDraft(path, {"gauges.z.sign": "no"})
     draft.write()
     assert [gauge.sign for gauge in load_cell(path).settings.gauges] == [1, 1, -1]

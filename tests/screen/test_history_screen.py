@@ -145,6 +145,8 @@ async def until_asked(pilot: Pilot[int]) -> None:
 async def test_an_open_proposal_is_written_once_it_is_approved(cell: Cell, left: ProposedRun) -> None:
     async with opened_history(cell) as pilot:
         assert latest_line(pilot).endswith("proposal")
+        keys = pilot.app.screen.query_one(KeyLine)
+        assert "w Write its proposal" in str(keys.content)
         await pilot.press("w")
         await until_asked(pilot)
         assert "No held-out record has verified it." in shown(pilot)
@@ -153,6 +155,7 @@ async def test_an_open_proposal_is_written_once_it_is_approved(cell: Cell, left:
         await until_shown(pilot, "approved by a person at the screen.")
         assert "Restart or reload the controller" in shown(pilot)
         await until(lambda: latest_line(pilot).endswith("in controller"))
+        await until(lambda: "Write its proposal" not in str(keys.content))
         await press(pilot, "w")
         await until_noticed(pilot, "has no proposal that could be written")
     assert cell.config_path.read_bytes() == left.after

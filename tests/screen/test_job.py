@@ -115,7 +115,7 @@ async def test_from_mounting_to_approval(cell, run, history, opened) -> None:
         run.tell(messages.StatusChanged(status=Status.ENDED))
         await until(lambda: not isinstance(pilot.app.screen, QuestionOverlay))
         await press(pilot, "4")
-        await until_shown(pilot, "PASS: The error and the guard band together are within the limit.")
+        await until_shown(pilot, "PASS: The error with its safety margin is within the limit.")
         assert "Teach anew" in shown(pilot)
         assert re.search(r"S1y -\d+\.\d{3} -\d+\.\d{3} -5\.751 0\.095 +changed \(60", shown(pilot))
 

@@ -14,7 +14,7 @@ from drivers.controllers.poses import agree, require_unmoved
 from drivers.controllers.reload_command import run_reload_command
 from drivers.interfaces import StartupAction
 from drivers.wire_trace import TraceRecorder
-from hexacell.cell.robot import ControllerSettings
+from hexacell.cell.robot import ControllerOptions, ControllerSettings
 from hexacell.errors import DeviceError, UsageError
 from hexacell.kinematics.pose import Pose
 
@@ -43,7 +43,7 @@ class AdapterController:
     After a failure nothing moves before it was prepared again, which also replaces a link that broke.
     """
 
-    Options = AdapterOptions
+    Options: type[ControllerOptions] = AdapterOptions
 
     def __init__(
         self,
@@ -184,6 +184,7 @@ class AdapterController:
             if command := self._settings.reload_command:
                 await run_reload_command(command, self._name, self._timeouts.reload)
                 link.fail("was started anew")
+                self._was_enabled = False  # it may be in the emergency stop that it starts in
                 link = await self._reconnected()
             else:
                 await self._do(link, "reload", self._timeouts.reload)

@@ -6,7 +6,7 @@ from contextlib import contextmanager, suppress
 from pathlib import PurePath
 
 from drivers import errors, interfaces
-from drivers.controllers.linuxcnc import protocol, startup
+from drivers.controllers.linuxcnc import gcode, protocol, startup
 from drivers.controllers.linuxcnc.commands import ControllerCommands
 from drivers.controllers.linuxcnc.session import Session
 from drivers.controllers.poses import agree, require_unmoved
@@ -40,7 +40,7 @@ class LinuxcncrshController:
         self._session = Session(settings, timeouts, trace)
         self._order = asyncio.Lock()
         self._joints_before_reload: tuple[float, ...] | None = None
-        self._restoring = protocol.restoring_block("")
+        self._restoring = gcode.restoring_block("")
         self._has_changed_modes = False
         self._is_unready = False
 
@@ -86,7 +86,7 @@ class LinuxcncrshController:
                 await self._make_ready(commands, permitted, stops)
                 if self._has_changed_modes:
                     await self._restore_modes(commands)
-                self._restoring = protocol.restoring_block(await startup.check_coordinate_system(commands))
+                self._restoring = gcode.restoring_block(await startup.check_coordinate_system(commands))
 
     async def move(self, pose: Pose, duration_s: float) -> None:
         """Move to ``pose`` in inverse time; returns when the actual pose agrees with it.
@@ -102,7 +102,7 @@ class LinuxcncrshController:
         """
         stops = self._session.stop_count
         try:
-            block = protocol.timed_move(pose, duration_s)
+            block = gcode.timed_move(pose.as_tuple(), duration_s)
         except ValueError as error:
             raise errors.MoveRefused(f"to move to {pose}", str(error), subject=self._name) from error
         limit_s = 2.0 * duration_s + self._timeouts.beyond_move
@@ -249,7 +249,7 @@ class LinuxcncrshController:
 
     def _move_refusal(self, pose: Pose, reason: str, action: str | None) -> errors.MoveRefused:
         move = f"to move to {pose}"
-        if (found := protocol.parse_pose_refusal(reason)) is None:
+        if (found := gcode.parse_pose_refusal(reason)) is None:
             return errors.MoveRefused(move, reason, subject=self._name, action=action)
         axis, is_highest = found
         return errors.PoseRefused(move, reason, subject=self._name, axis=axis, is_highest=is_highest)
@@ -269,7 +269,7 @@ class LinuxcncrshController:
             was_stopped = self._was_stopped_since(stops)
             if was_stopped or protocol.loop_time() > min(still_s + self._timeouts.arrival, last_s):
                 reason = "it was stopped on request" if was_stopped else await commands.reason()
-                if not was_stopped and protocol.parse_pose_refusal(reason):  # acknowledged all the same
+                if not was_stopped and gcode.parse_pose_refusal(reason):  # acknowledged all the same
                     raise self._move_refusal(target, reason, None)
                 raise errors.MotionInterrupted(
                     f"stopped at {there} before reaching {target}: {reason}",

@@ -29,6 +29,8 @@ def _devices(commands: Commands) -> None:
     words = "give the only device on a CAN bus this node id (LSS), after a question"
     add_value(parser, "--set-node", "ID", words, whole_number(1, LARGEST_NODE_ID))
     add_output(parser, "--write", NEW_CELL, "write a cell file: what was found, and your answers")
+    words = "answers for --write instead of a terminal; a new FILE is written with every question"
+    add_value(parser, "--answers", "FILE", words, Path)
     add_value(parser, "--diagnose", "NAME", "watch a gauge, or encoders, of --cell")
     add_value(parser, "--cell", "CELL", "the cell file (TOML) of --diagnose", Path)
     add_value(parser, "--seconds", "S", "how long --diagnose watches", bounded_seconds, 10.0)

@@ -13,15 +13,20 @@ from pydantic import TypeAdapter, ValidationError
 from drivers.discovery.encoders import set_node_id
 from hexacell.addresses import require_host
 from hexacell.cell.fields import SerialPortName, first_mistake
+from hexacell.cell.loader import LARGEST_FILE_BYTES
 from hexacell.cli.commands.cell import cell_at
 from hexacell.cli.console import Console
 from hexacell.cli.terminal import is_interactive
 from hexacell.errors import AnswerNeeded, ExitCode, UsageError
 from hexacell.services.devices.device_diagnosis import diagnose
-from hexacell.services.devices.device_search import SearchFindings, draft_of, search_devices
-from hexacell.storage.atomic_files import require_creatable
+from hexacell.services.devices.device_search import draft_of, search_devices
+from hexacell.services.devices.first_cell import CellDraft
+from hexacell.storage.atomic_files import os_errors, read_text, require_creatable
+from hexacell.storage.output_files import NEW_ANSWERS, OutputFile
+from hexacell.storage.toml_document import TomlDocument
 from hexacell.text import found_devices
 from hexacell.text.layout import wrapped
+from hexacell.text.screens.answers_file import take, template
 from hexacell.text.screens.first_questions import FirstCellAssistant
 
 TCP_PORTS = 1 << 16
@@ -55,10 +60,7 @@ def _set_node(options: argparse.Namespace, console: Console) -> ExitCode:
 
 
 def _search(options: argparse.Namespace, console: Console) -> ExitCode:
-    if options.write is not None:
-        require_creatable(options.write.path)
-        if not is_interactive():
-            raise AnswerNeeded("--write asks what no device reports", action="Start it at a terminal")
+    answers = _require_answers(options)
     for port in options.ports:
         try:
             TypeAdapter(SerialPortName).validate_python(port)
@@ -72,15 +74,47 @@ def _search(options: argparse.Namespace, console: Console) -> ExitCode:
     for line in found_devices.search_lines(found):
         console.print(wrapped(line))
     if options.write is not None:
-        return _write(found, options.write.path, console)
+        return _write(draft_of(found, options.write.path), options.answers, answers, console)
     if text:
         console.print(f"\nFor your cell file:\n\n{text}")
     return ExitCode.DONE
 
 
-def _write(found: SearchFindings, path: Path, console: Console) -> ExitCode:
+def _require_answers(options: argparse.Namespace) -> TomlDocument | None:
+    """The answers of ``--answers``, if there are any yet; raises if they are needed and cannot come."""
+    path: Path | None = options.answers
+    if options.write is None and path is not None:
+        raise UsageError("--answers is for a cell file that is written", action="Add --write CELL")
+    if options.write is not None:
+        require_creatable(options.write.path)
+        if path is None and not is_interactive():
+            action = "Start it at a terminal, or name a file of answers with --answers"
+            raise AnswerNeeded("--write asks what no device reports", action=action)
+    if path is None:
+        return None
+    with os_errors("cannot be read", path):
+        is_new = not path.exists()
+    return None if is_new else TomlDocument.parse(read_text(path, LARGEST_FILE_BYTES), path)
+
+
+def _write(draft: CellDraft, file: Path | None, answers: TomlDocument | None, console: Console) -> ExitCode:
+    """Write the cell file; without answers in their file, that file with the questions."""
+    if file is None:
+        _ask(draft, console)
+    elif answers is None:
+        OutputFile(file, NEW_ANSWERS).write(template(draft).encode())
+        problem = f"{file} is new, and has every question with what is known or proposed"
+        raise AnswerNeeded(problem, action="Correct it, and give the same command again")
+    else:
+        take(draft, answers)
+        draft.write()
+    console.print(f"\n{draft.path} is written. Next: hexacell preflight {draft.path}")
+    return ExitCode.DONE
+
+
+def _ask(draft: CellDraft, console: Console) -> None:
     """Ask for the rest, question by question; an empty answer takes what stands in brackets."""
-    assistant = FirstCellAssistant(path, draft_of(found, path))
+    assistant = FirstCellAssistant(draft.path, draft)
     while not assistant.is_done:
         if assistant.problem:
             console.error(assistant.problem)
@@ -91,8 +125,6 @@ def _write(found: SearchFindings, path: Path, console: Console) -> ExitCode:
         if not typed:
             raise AnswerNeeded("the questions were not all answered", action="No file was written")
         assistant.answer(typed.strip() or assistant.suggestion)
-    console.print(f"\n{path} is written. Next: hexacell preflight {path}")
-    return ExitCode.DONE
 
 
 def _watch(options: argparse.Namespace, console: Console) -> ExitCode:

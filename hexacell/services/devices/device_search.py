@@ -12,10 +12,12 @@ from typing import Any
 from drivers.discovery import USUAL, FoundController, SearchTimeouts, encoders, search_controller
 from drivers.discovery.gauges import FoundGauge, PortFindings, probe_of, search_port
 from drivers.serial.opening import SerialPortFound, serial_ports
+from hexacell.cell.robot import DEFAULT_CONTROLLER
 from hexacell.kinematics.parameters import LEGS, JointUnit
 from hexacell.noise.standstill import PADDED
 from hexacell.plugins import Group, load, names
-from hexacell.services.devices.first_cell import BITRATE, GAUGE_AXES, CellDraft, Document
+from hexacell.services.devices.cell_answers import GAUGE_AXES, Document
+from hexacell.services.devices.first_cell import BITRATE, CellDraft
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ def draft_of(found: SearchFindings, path: Path) -> CellDraft:
     gauges = found_gauges(found)[: len(GAUGE_AXES)]
     given: dict[str, str] = {}
     for axis, gauge in zip(GAUGE_AXES, gauges, strict=False):
-        given |= {f"protocol {axis}": gauge.protocol, f"port {axis}": gauge.port}
+        given |= {f"gauges.{axis}.protocol": gauge.protocol, f"gauges.{axis}.port": gauge.port}
     of_encoders: Document = {}
     if bank := found_bank(found):
         bus, nodes = bank
@@ -79,7 +81,8 @@ def draft_of(found: SearchFindings, path: Path) -> CellDraft:
         given["nodes"] = " ".join(str(node.node) for node in nodes)
         of_encoders = encoder_keys(nodes)
     if found.controller is not None:
-        given |= {"host": found.controller.host, "port": str(found.controller.port)}
+        given |= {"controller": DEFAULT_CONTROLLER, "host": found.controller.host}
+        given["port"] = str(found.controller.port)
     return CellDraft(path, given, tuple(map(gauge_keys, gauges)), of_encoders)
 
 

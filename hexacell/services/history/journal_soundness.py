@@ -134,7 +134,7 @@ class _Event:
         if isinstance(event, events.PilotTaken):
             due = FIRST_PILOT + len(self.state.set(event.at).pilots)
             if event.orientation != due or not self.state.set(event.at).samples:
-                yield f"pilot pose {pilot_number(event.orientation)} is not the next one"
+                yield f"preliminary pose {pilot_number(event.orientation)} is not the next one"
 
     def _is_pilot(self, orientation: int) -> bool:
         """Whether a pilot pose is meant, and may be: it is left for, but is no record."""

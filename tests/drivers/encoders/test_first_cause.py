@@ -47,7 +47,7 @@ async def test_a_node_that_sends_but_does_not_answer_is_told_so(raw, make_bank, 
     raw.nodes[3].answer_sdo = lambda request: answer(request)[:5]
     if kind == "heartbeat":
         raw.nodes[3].answer_sdo = lambda request: raw.send(0x703, b"\x7f") or b""
-    with pytest.raises(BusError, match=r"leg 3 .*sends, but no answer of eight.*Open the encoders again"):
+    with pytest.raises(BusError, match=r"leg 3 .*sends, but no answer of eight.*Try again"):
         await make_bank(timeout_s=0.3).open()
 
 

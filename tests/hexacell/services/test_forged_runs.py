@@ -69,7 +69,7 @@ FORGERIES: list[tuple[Forgery, str]] = [
     (other(events.Identified, held_out=((FAR,),)), "are not those of the cell file's points"),
     (other(events.RecordTaken, at=V9), "the cell file has no held-out point 9"),
     (lambda h: h.append(first_taken(h)), "orientation 1 is not the next one"),
-    (lambda h: h.append(pilot_taken(h, FIRST_PILOT + 1)), "pilot pose 2 is not the next one"),
+    (lambda h: h.append(pilot_taken(h, FIRST_PILOT + 1)), "preliminary pose 2 is not the next one"),
     (lambda h: reading_changed(h, gauges_mm=(float("nan"), 0.0, 0.0)), "nan is not within"),
     (lambda h: reading_changed(h, counts=((1, 2, 3, 4, 5),)), "the encoders have other counts"),
     (lambda h: reading_changed(h, at_s=-1.0), "no time of a run"),

@@ -15,7 +15,7 @@ from drivers.simulated.linuxcnc.state import ConnectionCut, ControllerState, Mac
 from hexacell.cell.robot import ControllerSettings
 from hexacell.kinematics.pose import Pose
 
-REPORT_S = 0.05
+REPORT_S, LEAVING_S = 0.05, 0.25
 
 
 class _Handler(socketserver.BaseRequestHandler):
@@ -23,8 +23,8 @@ class _Handler(socketserver.BaseRequestHandler):
     request: socket.socket
 
     def handle(self) -> None:
-        if not self.server.in_use.acquire(blocking=False):
-            return  # it serves somebody already
+        if not self.server.in_use.acquire(timeout=LEAVING_S):
+            return  # it serves somebody already, who is not just leaving
         try:
             with suppress(OSError), self.request.makefile("w") as answers:
                 serve(self.server.robot, self._lines(), answers)

@@ -223,7 +223,7 @@ def _model(document: toml_document.TomlDocument) -> type[CellSettings]:
 
 
 def _options(document: toml_document.TomlDocument) -> type[ControllerOptions]:
-    """The options of the controller's protocol; without any, one that is absent is told with the devices."""
+    """The options of the controller's protocol; without any, an absent one is told with the devices."""
     stated = document.data.get("controller")
     section = stated if isinstance(stated, dict) else {}
     protocol = section.get("protocol", DEFAULT_CONTROLLER)

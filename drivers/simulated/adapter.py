@@ -15,7 +15,9 @@ from drivers.simulated.linuxcnc.state import ConnectionCut, ControllerState, Mac
 from hexacell.cell.robot import ControllerSettings
 from hexacell.kinematics.pose import Pose
 
-REPORT_S, LEAVING_S = 0.05, 0.25
+REPORT_S = 0.05
+LEFT_WITHIN_S = 1.0
+"""How long a client that has just gone may still be noticed, s."""
 
 
 class _Handler(socketserver.BaseRequestHandler):
@@ -23,8 +25,8 @@ class _Handler(socketserver.BaseRequestHandler):
     request: socket.socket
 
     def handle(self) -> None:
-        if not self.server.in_use.acquire(timeout=LEAVING_S):
-            return  # it serves somebody already, who is not just leaving
+        if not self.server.in_use.acquire(timeout=LEFT_WITHIN_S):
+            return  # it serves somebody already
         try:
             with suppress(OSError), self.request.makefile("w") as answers:
                 serve(self.server.robot, self._lines(), answers)

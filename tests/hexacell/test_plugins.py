@@ -15,13 +15,12 @@ import pytest
 
 from drivers.errors import translated
 from hexacell import plugins
-from hexacell.cell.loader import describe, load_cell
 from hexacell.cli import app
 from hexacell.cli.commands import cell
-from hexacell.errors import DeviceError, ExitCode, FileError, UsageError
+from hexacell.errors import DeviceError, ExitCode, UsageError
 from hexacell.plugins import Group, PluginFailed
 from hexacell.study.tasks import results_of
-from tests.cli.cell_folder import CellFolder, copy_cell
+from tests.cli.cell_folder import copy_cell
 
 Install = Callable[..., None]
 UNATTENDED = ("--unattended", "--mode", "optimise")
@@ -180,12 +179,11 @@ def test_a_task_of_a_study_is_named_where_it_is_carried_out(laser) -> None:
 
 
 DRIVER = """
-from hexacell.cell.fields import Positive, Text, key
+from hexacell.cell.fields import key
 from hexacell.cell.robot import ControllerOptions
 
 class BoxOptions(ControllerOptions):
-    slot: int = key(..., "its place in the rack", ge=1)
-    rate_hz: Positive = key(250.0, "how often it is asked")
+    slot: int = key(..., "its place in the rack")
 
 class Box:
     Options = BoxOptions
@@ -199,42 +197,16 @@ class Box:
 
 
 @pytest.fixture
-def box(install: Install, tmp_path: Path) -> Callable[[str, str], CellFolder]:
-    """A cell whose controller is of a package, with these options."""
+def box(install: Install, tmp_path: Path) -> Callable[[str], str]:
+    """A cell whose controller is of a package."""
     cell = copy_cell(tmp_path)
+    cell.edit(('"linuxcncrsh"', '"box"\noptions = { slot = 3 }'))
 
-    def with_options(options: str, body: str = DRIVER) -> CellFolder:
+    def of(body: str) -> str:
         install("box_a", "box = box_a:Box", body, Group.CONTROLLERS)
-        cell.edit(('"linuxcncrsh"', f'"box"\noptions = {{ {options} }}'))
-        return cell
+        return str(cell.cell)
 
-    return with_options
-
-
-def test_options_of_a_controller_are_checked_by_its_own_model_and_shown(box, capsys) -> None:
-    cell = load_cell(box("slot = 3", DRIVER).cell)
-    assert type(cell.settings.controller.options).__name__ == "BoxOptions"
-    shown = describe(cell)
-    assert re.search(r"(?m)^slot = 3  # line 42$", shown)
-    assert "rate_hz = 250.0  # default" in shown
-    assert app.main(["cell", "schema"]) == ExitCode.DONE
-    assert "its place in the rack" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ("slot = 3, rate_hs = 5.0", r"rate_hs.*Did you mean 'rate_hz'"),
-        ("rate_hz = 5.0", r"slot"),
-        ("slot = 0", r"slot"),
-        ('slot = "3"', r"slot"),
-        ("slot = 3, rate_hz = -1.0", r"rate_hz"),
-    ],
-)
-def test_a_mistake_in_the_options_of_a_controller_is_told_with_its_line(box, options, words) -> None:
-    with pytest.raises(FileError, match=words) as caught:
-        load_cell(box(options, DRIVER).cell)
-    assert caught.value.line in {41, 42}
+    return of
 
 
 @pytest.mark.parametrize(
@@ -245,7 +217,7 @@ def test_a_mistake_in_the_options_of_a_controller_is_told_with_its_line(box, opt
     ],
 )
 def test_a_controller_that_cannot_be_loaded_is_named_with_its_version(box, capsys, body, reason) -> None:
-    assert app.main(["cell", "show", str(box("slot = 3", body).cell)]) == ExitCode.HARDWARE
+    assert app.main(["cell", "show", box(body)]) == ExitCode.HARDWARE
     said = " ".join(capsys.readouterr().err.split())
     assert "box_a 1.0: controller protocol 'box' cannot be loaded" in said
     assert reason in said
@@ -267,5 +239,5 @@ def test_a_controller_that_is_not_whole_or_fails_is_named_with_its_version(
     body = DRIVER + "".join(
         f"\n    async def {one}(self, *_): ..." for one in f"prepare position status {methods}".split()
     )
-    assert app.main(["run", str(box("slot = 3", body).cell), *UNATTENDED]) == ExitCode.HARDWARE
+    assert app.main(["run", box(body), *UNATTENDED]) == ExitCode.HARDWARE
     assert f"box_a 1.0: {reason}" in " ".join(capsys.readouterr().err.split())

@@ -120,8 +120,10 @@ class UrdfText:
                 found[joint, match[1]].append((token, uncertain))
 
         def refuse(*_: object) -> None:
-            line, action = parser.CurrentLineNumber, "Remove it"
-            raise FileError("a URDF file has no DOCTYPE", subject=self.source, line=line, action=action)
+            line = parser.CurrentLineNumber
+            raise FileError(
+                "a URDF file has no DOCTYPE", subject=self.source, line=line, action="Remove it"
+            )
 
         parser.StartElementHandler, parser.StartDoctypeDeclHandler = begin, refuse
         parser.EndElementHandler = lambda _: open_elements.pop()

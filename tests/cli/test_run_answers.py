@@ -115,7 +115,7 @@ class TestAPersonAtTheTerminal:
         quick_cell.edit(BY_HAND, ("[acceptance]", "[acceptance]\ndrift_mm = 0.00001"), fixed)
         process = start_at(terminal, start, "run", quick_cell.cell, "--mode", "check")
         first = terminal.read_until(PLACED)
-        assert "The robot holds the ball at X0.000 Y0.000 Z550.000" in first
+        assert "The robot holds the ball at x 0.0, y 0.0, z 550.0" in first
         terminal.type("\n\n")  # an Enter too many must not answer the next question
         terminal.read_until("Type one of retry, measure-again, redo-set, abort: ")
         terminal.type("re\n")

@@ -16,6 +16,8 @@ from hexacell.cell.robot import ControllerSettings
 from hexacell.kinematics.pose import Pose
 
 REPORT_S = 0.05
+LEFT_WITHIN_S = 1.0
+"""How long a client that has just gone may still be noticed, s."""
 
 
 class _Handler(socketserver.BaseRequestHandler):
@@ -23,7 +25,7 @@ class _Handler(socketserver.BaseRequestHandler):
     request: socket.socket
 
     def handle(self) -> None:
-        if not self.server.in_use.acquire(blocking=False):
+        if not self.server.in_use.acquire(timeout=LEFT_WITHIN_S):
             return  # it serves somebody already
         try:
             with suppress(OSError), self.request.makefile("w") as answers:

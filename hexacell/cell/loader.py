@@ -19,7 +19,7 @@ from hexacell.cell.fields import Section
 from hexacell.cell.model import CellSettings
 from hexacell.cell.robot import DEFAULT_CONTROLLER, DEFAULT_MECHANISM, ControllerOptions
 from hexacell.errors import FileError, HexacellError, UsageError, did_you_mean, joined
-from hexacell.plugins import Group, load, names
+from hexacell.plugins import Group, PluginFailed, broken, load, names
 from hexacell.storage import toml_document
 from hexacell.storage.atomic_files import read_text
 
@@ -121,12 +121,15 @@ def require_plugins(cell: Cell) -> None:
 
     Raises:
         FileError: one is not installed; the message has its line and names the most similar one.
-        SeveralErrors: more than one.
+        PluginFailed: one cannot be imported.
+        SeveralErrors: more than one of these.
     """
     failures: list[HexacellError] = []
     for path, group, name in sorted(_plugins(cell.settings), key=lambda one: one[1].value):
         try:
             load(group, name)
+        except PluginFailed as error:
+            failures.append(error)
         except HexacellError as error:
             line = cell.document.line_of(path)
             failures.append(FileError(error.problem, subject=cell.path, line=line, action=error.action))
@@ -220,14 +223,16 @@ def _model(document: toml_document.TomlDocument) -> type[CellSettings]:
 
 
 def _options(document: toml_document.TomlDocument) -> type[ControllerOptions]:
-    """The options of the controller's protocol; one that is not installed is reported with the devices."""
+    """The options of the controller's protocol; without any, an absent one is told with the devices."""
     stated = document.data.get("controller")
-    protocol = stated.get("protocol", DEFAULT_CONTROLLER) if isinstance(stated, dict) else None
-    if protocol == DEFAULT_CONTROLLER or protocol not in names(Group.CONTROLLERS):
+    section = stated if isinstance(stated, dict) else {}
+    protocol = section.get("protocol", DEFAULT_CONTROLLER)
+    is_absent = protocol not in names(Group.CONTROLLERS) and not section.get("options")
+    if protocol == DEFAULT_CONTROLLER or not isinstance(protocol, str) or is_absent:
         return ControllerOptions  # the default has none, and its driver takes a while to be imported
     try:
         return controller_options(protocol)
-    except HexacellError as error:
+    except UsageError as error:
         raise document.error(("controller", "protocol"), error.problem, error.action or "") from error
 
 
@@ -235,14 +240,13 @@ def controller_options(protocol: str) -> type[ControllerOptions]:
     """The options of a controller's protocol: ``Options`` of its driver, if it has any.
 
     Raises:
-        UsageError: there is no such driver, it cannot be imported, or has options that are no
-            ``ControllerOptions``.
+        UsageError: there is no such driver.
+        PluginFailed: it cannot be imported, or has options that are no ``ControllerOptions``.
     """
     options = getattr(load(Group.CONTROLLERS, protocol), "Options", ControllerOptions)
     if not (isinstance(options, type) and issubclass(options, ControllerOptions)):
-        raise UsageError(
-            f"the Options of controller protocol '{protocol}' are no ControllerOptions",
-            action="Derive them from hexacell.cell.robot.ControllerOptions, or inform the driver's maker",
+        raise broken(
+            Group.CONTROLLERS, protocol, "its Options are no hexacell.cell.robot.ControllerOptions"
         )
     return options
 

@@ -10,9 +10,10 @@ names the places of ``legs: [{base: {x: 1.0, ...}, length: 590.0}, ...]``; ``{ax
 import json
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from hexacell.config.keyed_config import KeyedConfig, KeyedOptions, options_of
 from hexacell.errors import FileError
 from hexacell.kinematics.parameters import GeometricParameter, ParameterSet
 
-_OCTAL = re.compile(r"[+-]?0\d")
+_OCTAL = re.compile(r"[+-]?0+\d")
 _MERGED = "tag:yaml.org,2002:merge"
 
 
@@ -49,6 +50,12 @@ def _default(parameter: GeometricParameter) -> str:
     return ".".join(filter(None, (parameter.kind.symbol, str(parameter.leg - 1), parameter.component)))
 
 
+@dataclass(slots=True)
+class _Value:
+    token: NumberToken
+    problem: str
+
+
 @dataclass(frozen=True)
 class TreeText:
     """A :class:`~hexacell.config.keyed_config.NumberLookup` in such a text."""
@@ -61,30 +68,29 @@ class TreeText:
         """The number at a place.
 
         Raises:
-            FileError: it is absent, there twice, shared, text, or a number that others read otherwise.
+            FileError: it is absent, text, or a number that others read otherwise; or it, or what it is in,
+                is there twice or shared.
         """
-        if not (found := self._places[key]):
+        found: list[_Value] = []
+        for place in accumulate(key.split("."), "{}.{}".format):
+            found = self._places.get(place, [])
+            problem = found[-1].problem if found else ""
+            if len(found) > 1:
+                problem = f"is there a second time, after line {found[0].token.line}"
+            if problem:
+                action = "Write one plain number there"
+                raise token_error(found[-1].token, f"{place} {problem}", self.source, action)
+        if not found:
             action = "Correct [controller.config_options], or name the file that has it"
             raise FileError(f"there is nothing at {key}", subject=self.source, action=action)
-        token, problem = found[-1]
-        if len(found) > 1:
-            problem = f"{key} is there a second time, after line {found[0][0].line}"
-        if (
-            not problem
-            and token.text.lstrip("+-").startswith("0")
-            and token.text.lstrip("+-0")[:1].isdigit()
-        ):
-            problem = f"{token.text} at {key} begins with 0, as octal numbers do"
-        if problem:
-            raise token_error(token, problem, self.source, "Write one plain number there")
-        return token
+        return found[0].token
 
     def has(self, key: str) -> bool:
         """Whether there is something at a place."""
         return key in self._places
 
     @cached_property
-    def _places(self) -> Mapping[str, list[tuple[NumberToken, str]]]:
+    def _places(self) -> Mapping[str, list[_Value]]:
         import yaml  # noqa: PLC0415 - only for these formats
 
         text = self.text
@@ -102,41 +108,23 @@ class TreeText:
             raise self._unreadable(str(error).splitlines()[0], None) from error
         except RecursionError as error:
             raise self._unreadable("it is nested too deeply", None) from error
-        found: defaultdict[str, list[tuple[NumberToken, str]]] = defaultdict(list)
-        for place, token, problem in self._scalars(root, (), set()):
-            found[place].append((token, problem))
+        found: defaultdict[str, list[_Value]] = defaultdict(list)
+        first, left = dict[int, _Value](), [] if root is None else [("", root)]
+        while left:
+            place, node = left.pop()
+            value = _Value(self._token(node), _problem(node))
+            found[place].append(value)
+            if (shared := first.setdefault(id(node), value)) is not value:
+                value.problem = shared.problem = "is used in more than one place, by an alias"
+            else:
+                left += [
+                    (f"{place}.{name}".lstrip("."), child) for name, child in reversed(_children(node))
+                ]
         return found
 
-    def _scalars(
-        self,
-        node: Any,  # noqa: ANN401 - of a library without types
-        place: tuple[str, ...],
-        seen: set[int],
-    ) -> Iterator[tuple[str, NumberToken, str]]:
-        """Each single value with its place, and why it cannot be rewritten; empty if it can."""
-        if node is None:
-            return
-        if isinstance(node.value, str):
-            token = NumberToken(
-                self.text[node.start_mark.index : node.end_mark.index],
-                node.start_mark.index,
-                node.end_mark.index,
-                node.start_mark.line + 1,
-            )
-            name, problem = ".".join(place), ""
-            if id(node) in seen:
-                problem = f"{name} is an alias: what is written there is used elsewhere too"
-            elif node.style is not None:
-                problem = f"{name} is text, not a number"
-            yield name, token, problem
-        elif id(node) not in seen:
-            pairs = enumerate(node.value) if node.id == "sequence" else node.value
-            for key, value in pairs:
-                if isinstance(key, int):
-                    yield from self._scalars(value, (*place, str(key)), seen)
-                elif key.tag != _MERGED and isinstance(key.value, str):
-                    yield from self._scalars(value, (*place, key.value), seen)
-        seen.add(id(node))
+    def _token(self, node: Any) -> NumberToken:  # noqa: ANN401 - of a library without types
+        start, end = node.start_mark.index, node.end_mark.index
+        return NumberToken(self.text[start:end], start, end, node.start_mark.line + 1)
 
     def _unreadable(self, problem: str, line: int | None) -> FileError:
         return FileError(
@@ -145,3 +133,20 @@ class TreeText:
             line=line,
             action="Correct it, or name another config_format",
         )
+
+
+def _children(node: Any) -> list[tuple[str, Any]]:  # noqa: ANN401
+    """What is in a list or a table, in its order; a merge key has nothing of its own."""
+    if node.id == "sequence":
+        return [(str(place), child) for place, child in enumerate(node.value)]
+    pairs = node.value if node.id == "mapping" else ()
+    return [(key.value, child) for key, child in pairs if key.id == "scalar" and key.tag != _MERGED]
+
+
+def _problem(node: Any) -> str:  # noqa: ANN401
+    """Why a single value is no number to be rewritten; empty if it is one."""
+    if node.id != "scalar":
+        return ""
+    if node.style is not None:
+        return "is text, not a number"
+    return f"is {node.value}, which some read as an octal number" if _OCTAL.match(node.value) else ""

@@ -23,7 +23,7 @@ OF_RING = {"joints": "-700 700", "points": "0 0 400 60"}
 """What no cell that comes along proposes."""
 OPTIONS = {
     "adapter": ['options.command = ["python3", "my-adapter.py"]'],
-    "opcua": ['options.endpoint = "opc.tcp://10.0.0.5:4840"'],
+    "opcua": ['options.endpoint = "opc.tcp://10.0.0.5:4840"', 'options.node = "ns=3;s=robot.{name}"'],
     "talker": ['options.address = "room 5"', "options.rate = 7", 'options.nodes = { done = "n1" }'],
     "chooser": ['options.there = "room 6"'],
 }

@@ -147,7 +147,7 @@ class AdapterController:
     async def stop(self) -> None:
         """Stop the motion in place; returns at rest. Orders that are still waiting are not executed.
 
-        Where the link is broken or breaks, another one is opened for it.
+        Where the link is broken or breaks, or the stop is refused, another one is opened for it.
 
         Raises:
             DeviceError: the robot could not be stopped, or that is unknown.
@@ -158,7 +158,9 @@ class AdapterController:
             try:
                 try:
                     await self._stop_over(self._connected())
-                except errors.ConnectionLost:
+                except (errors.ConnectionLost, errors.CommandRefused) as error:
+                    if self._link is not None:
+                        self._link.fail(error.problem)  # perhaps its own connection to the robot is lost
                     await self._stop_over(await self._linked(self._timeouts.stop))
             except DeviceError as error:
                 self._is_unstopped = True

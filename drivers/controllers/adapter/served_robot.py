@@ -12,6 +12,7 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, Protocol, TextIO
 
 VERSION = 1
@@ -114,5 +115,5 @@ class _Service:
         return None
 
     def _send(self, request: Told, **answer: Any) -> None:  # noqa: ANN401 - what JSON can hold
-        with self._writing:
+        with self._writing, suppress(OSError):  # where nobody listens any more, the requests end too
             print(json.dumps({"id": request["id"], **answer}), file=self._answers, flush=True)

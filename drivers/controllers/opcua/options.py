@@ -46,7 +46,9 @@ class OpcUaOptions(ControllerOptions):
     endpoint: Annotated[Text, Field(pattern=r"^opc\.tcp://[^@\s]+$")] = key(
         ..., "address of the PLC's OPC UA server, opc.tcp://host:port/path"
     )
-    node: Text = key("", "node id of all nodes but those of nodes, with {name} in it")
+    node: Text = key(
+        ..., "node id of all nodes but those of nodes, with {name} in it; empty if nodes has all"
+    )
     nodes: dict[str, NodeId | Six[NodeId]] = key(
         {}, "node ids by name; an empty one: there is no such node"
     )

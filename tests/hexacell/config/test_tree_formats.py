@@ -1,6 +1,7 @@
 """Configs in JSON, YAML and URDF: only numbers change, and what cannot be rewritten safely is refused."""
 
 import json
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -14,6 +15,7 @@ from hexacell.config.interface import ConfigFormat
 from hexacell.config.urdf import UrdfOrigins
 from hexacell.errors import FileError, UsageError
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS as PARAMETERS
+from hexacell.kinematics.mechanisms.rotary_cranks import ROTARY_CRANKS_PARAMETERS
 
 SIGNS = [1, 1, 1, -1, -1, -1]
 NAMES = {"S": "legs.{index}.rail.{component}", "B": "legs.{index}.joint.{axis}", "l": "legs.{index}.length"}
@@ -115,8 +117,15 @@ FIRST = f"{DRAWN['S1x']}"
         (lambda text: text.replace(f"x: {FIRST}", "x: 1_000.0"), "is not a number"),
         (lambda text: text.replace(f"x: {FIRST}", "x: 010"), "octal"),
         (lambda text: text.replace(f"x: {FIRST}", f"x: {FIRST}, x: 2.0"), "a second time, after line 4"),
-        (lambda text: text.replace(f"x: {FIRST}", f"x: &a {FIRST}, w: *a"), "is not a number"),
-        (lambda text: "w: &a 5.0\n" + text.replace(f"x: {FIRST}", "x: *a"), "is an alias"),
+        (lambda text: text.replace(f"x: {FIRST}", f"x: &a {FIRST}, w: *a"), "by an alias"),
+        (lambda text: "w: &a 5.0\n" + text.replace(f"x: {FIRST}", "x: *a"), "by an alias"),
+        (
+            lambda text: text.replace("rail: {", "rail: &a {", 1) + "tool: *a\n",
+            "legs.0.rail is used .* by an alias",
+        ),
+        (lambda text: "legs: [{}]\n" + text, "legs is there a second time, after line 1"),
+        (lambda text: text.replace(FIRST, f"!!float {FIRST}"), "is not a number"),
+        (lambda text: "loop: &a [*a]\n", "nothing at legs.0.rail.x"),
         (
             lambda text: "w: &a {x: 5.0}\n" + text.replace(f"x: {FIRST}", "<<: *a"),
             "nothing at legs.0.rail.x",
@@ -139,6 +148,7 @@ def test_yaml_that_cannot_be_rewritten_is_refused(change: Callable[[str], str], 
         (FIRST, "NaN", "'NaN' is not a number"),
         (FIRST, "null", "'null' is not a number"),
         (f"{FIRST},", f'{FIRST},\n"x": 1,', "a second time"),
+        ("{", '{"legs": [],', "legs is there a second time, after line 1"),
         ("{", "{ // a remark\n", "cannot be read as JSON"),
     ],
 )
@@ -157,7 +167,9 @@ X = f"{DRAWN['S1x'] / 1000:.7f}"
         (X, "${x + 2 * y}", "is not a number"),
         (X, "", "has not three numbers"),
         (X, "&#49;", "has not three numbers"),
-        (f'xyz="{X}', f'wxyz="{X}', "has no xyz"),
+        (f'xyz="{X}', f'wxyz="{X}', "no joint has an origin rail_1/x"),
+        ("</robot>", "<joint name='rail_1'><origin xyz='0 0 0'/></joint></robot>", "a second time"),
+        ('<robot name="r\u00f6bot">', "<!DOCTYPE robot [<!ENTITY a '1'>]><robot>", "has no DOCTYPE"),
         ("rail_2", "rail_1", "a second time, after line"),
         ("rail_1", "rail_one", "no joint has an origin rail_1/x"),
         ("</robot>", "", "cannot be read as XML"),
@@ -168,6 +180,33 @@ def test_urdf_that_cannot_be_rewritten_is_refused(old: str, new: str, words: str
     place = text.index("-->") if old.startswith("rail") else 0
     with pytest.raises(FileError, match=words):
         KINDS["urdf"].form.read(text[:place] + text[place:].replace(old, new, 1), None)
+
+
+@pytest.mark.parametrize("element", ["xacro:macro", "xacro:if", "xacro:unless"])
+def test_what_may_not_be_there_once_is_refused(element: str) -> None:
+    text = (
+        as_urdf(DRAWN)
+        .replace('name="r\u00f6bot">', f"><{element}>")
+        .replace("</robot>", f"</{element}></robot>")
+    )
+    with pytest.raises(FileError, match=f"the joint rail_1 is inside <{element}>"):
+        KINDS["urdf"].form.read(text, None)
+
+
+def test_angles_of_origins_are_radians_and_joints_of_others_are_no_concern() -> None:
+    options = {"names": {"zero": "drive_{leg}/yaw"}, "branch": SIGNS}
+    form = UrdfOrigins(ROTARY_CRANKS_PARAMETERS, options, is_part=True)
+    drives = (f"<joint name='drive_{leg}'><origin rpy='0 0 {leg / 100}'/></joint>" for leg in range(1, 7))
+    text = "".join(["<robot><joint name='tool'><origin rpy='1 1 1'/></joint>", *drives, "</robot>"])
+    found = form.read(text, None).values
+    assert found == pytest.approx({f"zero{leg}": math.degrees(leg / 100) for leg in range(1, 7)})
+    new = {name: value + 1.0 for name, value in found.items()}
+    assert form.read(form.rewrite(text, new), None).values == pytest.approx(new, abs=1e-7)
+
+
+def test_a_unit_must_be_one() -> None:
+    with pytest.raises(UsageError, match="unit_mm"):
+        UrdfOrigins(PARAMETERS, {"names": JOINTS, "branch": SIGNS, "unit_mm": 0})
 
 
 def test_a_branch_must_be_given() -> None:

@@ -9,7 +9,6 @@ from hypothesis import HealthCheck, given, reject, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from hexacell.cell.fields import Frozen
 from hexacell.errors import UsageError
 from hexacell.run_process import messages
 from hexacell.run_process.live_snapshot import GaugeSnapshot, LiveSnapshot
@@ -17,6 +16,7 @@ from procedures.engine.command_loop import Status
 from procedures.engine.commands import Command, Undo
 from procedures.run.questions import Question
 from procedures.steps import events
+from tests.complete_models import complete
 
 NOON = TypeAdapter(datetime).validate_json('"2026-11-20T12:00:00.123Z"')
 EVENTS: tuple[Any, ...] = get_args(get_args(events.Event)[0])
@@ -31,17 +31,10 @@ SAME_EACH_TIME = settings(
 )
 
 
-def complete(model: type[Frozen]) -> None:
-    """Build the models that nobody has used yet: hypothesis does not see their fields before."""
-    for one in model.__subclasses__():
-        one.model_rebuild()
-        complete(one)
-
-
 @st.composite
 def valid(draw: st.DrawFn, kind: type[Any]) -> Any:
     """An instance of a record; hypothesis knows nothing of what its validators refuse."""
-    complete(Frozen)
+    complete()
     try:
         return draw(st.from_type(kind))
     except ValidationError:

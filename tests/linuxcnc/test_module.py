@@ -9,7 +9,7 @@ import pytest
 
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.controllers.linuxcnc_module.controller import LinuxcncController, LinuxcncOptions
-from drivers.errors import ConnectionLost, MoveRefused, PoseRefused, StartupNotPermitted
+from drivers.errors import ConnectionLost, MotionInterrupted, MoveRefused, PoseRefused, StartupNotPermitted
 from drivers.interfaces import Controller, StartupAction
 from hexacell.cell.loader import load_cell
 from hexacell.cell.robot import ControllerSettings
@@ -125,6 +125,13 @@ async def emergency_stop(machine: LinuxCNC) -> None:
         client.send("set estop on")
 
 
+async def command(machine: LinuxCNC, call: str) -> None:
+    """What another program does that has LinuxCNC's module, as AXIS."""
+    code = f"import linuxcnc; linuxcnc.command().{call}"
+    done = await asyncio.create_subprocess_exec("/usr/bin/python3", "-c", code)
+    assert await done.wait() == 0
+
+
 async def crash(machine: LinuxCNC) -> None:
     await asyncio.to_thread(machine.kill)
 
@@ -150,6 +157,46 @@ async def test_a_fault_in_a_move_is_named(
     await driver.prepare(ALL)
     await driver.move(BACK, MOVE_S)
     assert await is_at(driver, BACK)
+
+
+async def test_another_client_may_turn_the_override_but_not_take_the_mode(linuxcnc, driver) -> None:
+    """By the module too: linuxcncrsh refuses to command while a block is executed."""
+    await driver.prepare(ALL)
+    moving = await begun(driver, THERE, 1.0)
+    await command(linuxcnc, "feedrate(0.8)")
+    await moving
+    moving = await begun(driver, BACK, 20.0)
+    await command(linuxcnc, "mode(linuxcnc.MODE_MANUAL)")
+    with pytest.raises(MotionInterrupted, match="another client has put it into"):
+        await moving
+    for pose in (BACK, THERE):
+        with pytest.raises(MoveRefused, match="last move failed"):
+            await driver.move(pose, MOVE_S)
+    await driver.prepare(ALL)
+    await driver.move(BACK, MOVE_S)
+    await command(linuxcnc, "mode(linuxcnc.MODE_MANUAL)")
+    with pytest.raises(MoveRefused, match="another client has put it into manual mode"):
+        await driver.move(THERE, MOVE_S)
+    await driver.prepare(ALL)
+    await driver.move(THERE, MOVE_S)
+    assert await is_at(driver, THERE)
+
+
+async def test_a_frozen_task_moves_nothing_when_it_goes_on(linuxcnc, driver) -> None:
+    await driver.prepare(ALL)
+    await driver.move(BACK, MOVE_S)
+    linuxcnc.signal("STOP", "milltask")
+    try:
+        with pytest.raises(DeviceError, match=r"could not be stopped: .*frozen"):
+            await driver.move(THERE, MOVE_S)
+        await driver.close()
+    finally:
+        linuxcnc.signal("CONT", "milltask")
+    await driver.open()
+    await driver.prepare(ALL)
+    assert await is_at(driver, BACK)
+    await driver.move(THERE, MOVE_S)
+    assert await is_at(driver, THERE)
 
 
 async def test_a_task_that_ended_is_told_when_nothing_moves(linuxcnc, driver) -> None:

@@ -16,6 +16,7 @@ from contextlib import suppress
 from typing import Any, Protocol, TextIO
 
 VERSION = 1
+AGAIN_S = 0.1
 Told = Mapping[str, Any]
 Report = Callable[[Sequence[float]], None]
 """Tells where the robot is on its way: x, y, z, mm, and a, b, c, deg."""
@@ -74,9 +75,12 @@ class _Service:
                 self._answer(request)
             else:  # what takes its time; the others do not wait for it
                 self._orders.put(request)
-        self._robot.stop()  # nobody is there any more who could
         self._orders.put(None)
-        worker.join()
+        is_over = False
+        while not is_over:  # again, as the first one may precede the motion
+            self._robot.stop()  # nobody is there any more who could
+            worker.join(AGAIN_S)
+            is_over = not worker.is_alive()
 
     def _work(self) -> None:
         while (request := self._orders.get()) is not None:

@@ -79,11 +79,12 @@ def plugins(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Monkey
 
 def answered(draft: CellDraft, **changed: str) -> str:
     """The template with these answers, of which the options of a controller are those above."""
-    of_template = TomlDocument.parse(template(draft)).data
-    told = {"gauges": of_template.pop("gauges")}
-    lines = [f"{name} = {given!r}" for name, given in (of_template | changed).items() if name != "options"]
-    for axis, gauge in told["gauges"].items():
-        lines += [f"gauges.{axis}.{key} = {given!r}" for key, given in gauge.items()]
+    proposed = {**TomlDocument.parse(template(draft)).data}
+    lines = [
+        f"gauges.{axis} = {{ {', '.join(f'{k} = {v!r}' for k, v in gauge.items())} }}"
+        for axis, gauge in proposed.pop("gauges").items()
+    ]
+    lines += [f"{name} = {given!r}" for name, given in (proposed | changed).items() if name != "options"]
     return "\n".join([*lines, *OPTIONS.get(changed.get("controller", ""), ())])
 
 

@@ -85,14 +85,14 @@ def _cell_sections() -> Iterator[str]:
         name, section = waiting.pop(0)
         rows, parts = [], []
         for key, value in section["properties"].items():
-            part, is_list = _section_in(value, definitions)
-            if part is None:
+            found, is_list = _sections_in(value, definitions)
+            if not found:
                 words = _type(value, definitions).removesuffix(" or null")
                 default = _default(value, key in section.get("required", ()))
                 rows.append((f"`{key}`", words, default, escaped(value.get("description", ""))))
             else:
                 path = f"{name}.{key}" if name else key
-                parts.append((f"[{path}]" if is_list else path, part))
+                parts += [(f"[{path}]" if is_list else path, part) for part in found]
         yield f"## {f'`[{name}]`' if name else 'At the top of the file'}\n"
         yield f"{section.get('description', '')}\n"
         if rows:
@@ -100,16 +100,17 @@ def _cell_sections() -> Iterator[str]:
         waiting = parts + waiting
 
 
-def _section_in(value: dict[str, Any], definitions: dict[str, Any]) -> tuple[dict[str, Any] | None, bool]:
-    """The section that a key holds, and whether there may be several; None for a plain value."""
+def _sections_in(value: dict[str, Any], definitions: dict[str, Any]) -> tuple[list[dict[str, Any]], bool]:
+    """The section that a key holds, or each that it may, and whether it is a list; none: a plain value."""
     options = [value, *value.get("anyOf", ())]
     is_list = any(option.get("type") == "array" for option in options)
+    found = []
     for option in options:
         items = option.get("items") or next(iter(option.get("prefixItems", ())), None) or option
         reference = items.get("$ref", "").removeprefix("#/$defs/")
         if "properties" in definitions.get(reference, ()):
-            return definitions[reference], is_list
-    return None, False
+            found.append(definitions[reference])
+    return found, is_list
 
 
 _UNBOUNDED = 1e5

@@ -20,7 +20,7 @@ OWN = "hexacell"
 
 
 class PluginFailed(DeviceError):
-    """A plug-in of another package raised what only a fault of it can be; ``subject`` is the package."""
+    """A plug-in is not what it must be, or raised what is its fault; ``subject`` is its package."""
 
 
 class Group(Enum):
@@ -49,16 +49,16 @@ def load(group: Group, name: str) -> Factory:
     """Import the class or factory that is announced as ``name`` in ``group``.
 
     Raises:
-        UsageError: nothing has that name, two packages define it, its import fails, or it is not
-            callable.
+        UsageError: nothing has that name, or two packages define it.
+        PluginFailed: its import fails, or it is not callable.
     """
     point = _only(group, name)
     try:
         factory: object = point.load()
     except Exception as error:  # third-party code may raise anything
-        raise _broken(group, point, repr(error)) from error
+        raise broken(group, name, repr(error)) from error
     if not callable(factory):
-        raise _broken(group, point, f"{factory!r} is not callable")
+        raise broken(group, name, f"{factory!r} is not callable")
     _log.debug("%s '%s' is %s", group.noun, name, point.value)
     return factory
 
@@ -68,7 +68,7 @@ def created(group: Group, name: str, *arguments: object, **named: object) -> Any
 
     Raises:
         UsageError: as :func:`load` does.
-        PluginFailed: it takes no such arguments, or fails.
+        PluginFailed: as that does; or it takes no such arguments, or fails.
     """
     factory = load(group, name)
     with plugin_failures_named():
@@ -145,9 +145,12 @@ def _only(group: Group, name: str) -> EntryPoint:
     return found[0]
 
 
-def _broken(group: Group, point: EntryPoint, reason: str) -> UsageError:
-    return UsageError(
-        f"{group.noun} '{point.name}' cannot be loaded from {point.value}: {reason}",
+def broken(group: Group, name: str, reason: str) -> PluginFailed:
+    """The error for a plug-in that is not what it must be, with its package and version."""
+    point = _only(group, name)
+    return PluginFailed(
+        f"{group.noun} '{name}' cannot be loaded from {point.value}: {reason}",
+        subject=f"{point.dist.name} {point.dist.version}" if point.dist else None,
         action=f"Repair or uninstall {_packages([point])}",
     )
 

@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 from drivers.simulated import robot
-from hexacell import services
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.model import CellSettings
 from hexacell.design.search_effort import SearchEffort
+from hexacell.services import search_effort
 from procedures.steps import events
 
 FREE: dict[str, Any] = {
@@ -68,7 +68,7 @@ def changed(section: Any, changes: dict[str, Any]) -> Any:
 
 def choose_among_few(patch: pytest.MonkeyPatch) -> None:
     """Have the program's services choose among few poses, and the simulated robot move in few pieces."""
-    patch.setattr(services, "EFFORT", FEW_CHOICES)
+    patch.setattr(search_effort, "EFFORT", FEW_CHOICES)
     patch.setattr(robot, "LINE_STEPS", 8)
 
 

@@ -1,20 +1,29 @@
 """The tests that every controller's driver passes, against a twin of its controller and of a machine."""
 
 import asyncio
+import math
 from abc import abstractmethod
+from dataclasses import replace
 from typing import Protocol
 
 from drivers.conformance.suite import FAULTS, Suite, against_twin, failure, require_named
-from drivers.controllers.linuxcnc.protocol import pose_difference
+from drivers.controllers.poses import agree
 from drivers.errors import MotionInterrupted, MoveRefused, StartupNotPermitted
 from drivers.interfaces import Controller, StartupAction
 from hexacell.cell.robot import ControllerSettings
 from hexacell.cell.simulation import FaultKind
+from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
 
 ALL = frozenset(StartupAction)
-QUICK_S, SLOW_S = 0.1, 30.0
-"""Durations of a move that is awaited, and of one that is stopped on its way."""
+QUICK_S, LASTING_S, SLOW_S = 0.1, 0.5, 30.0
+"""Durations of a move that is awaited, of one that is watched, and of one that is stopped on its way."""
+
+EARLY = 0.9
+"""Share of its duration after which a move may be over, by another clock."""
+
+BEGUN = 20
+"""So many times others get their turn before a preparation that has begun is cancelled."""
 
 
 class ControllerTwin(Protocol):
@@ -37,7 +46,7 @@ class ControllerTwin(Protocol):
 
 
 class ControllerConformance(Suite[Controller, ControllerTwin]):
-    """Subclass it in a test file, name it ``Test...``, and say what is tested."""
+    """Subclass it in a test file, name it ``Test...``, and say what is tested: docs/add-a-controller.md."""
 
     @abstractmethod
     def driver(self, settings: ControllerSettings) -> Controller:
@@ -63,6 +72,53 @@ class ControllerConformance(Suite[Controller, ControllerTwin]):
             assert await self._is_at(controller, twin, pose)
 
     @against_twin
+    async def test_a_move_is_over_when_its_time_is(
+        self, controller: Controller, twin: ControllerTwin
+    ) -> None:
+        await self._ready(controller)
+        now = asyncio.get_running_loop().time
+        began_s, moving = now(), asyncio.create_task(controller.move(twin.target, LASTING_S))
+        while not moving.done():
+            assert (await controller.status()).may_move
+            await asyncio.sleep(0)
+        await moving
+        assert now() - began_s >= EARLY * LASTING_S
+        assert await self._is_at(controller, twin, twin.target)
+
+    @against_twin
+    async def test_moves_come_one_after_another(self, controller: Controller, twin: ControllerTwin) -> None:
+        start = await self._ready(controller)
+        await asyncio.gather(*(controller.move(pose, QUICK_S) for pose in (twin.target, start)))
+        assert await self._is_at(controller, twin, start)
+
+    @against_twin
+    async def test_nothing_moves_until_it_is_prepared(
+        self, controller: Controller, twin: ControllerTwin
+    ) -> None:
+        name = (await controller.open()).name
+        require_named(await failure(lambda: controller.move(twin.target, QUICK_S)), name)
+        preparing = asyncio.create_task(controller.prepare(ALL))
+        for _ in range(BEGUN):
+            await asyncio.sleep(0)
+        preparing.cancel()
+        await asyncio.gather(preparing, return_exceptions=True)
+        await controller.stop()
+        if preparing.cancelled():
+            require_named(await failure(lambda: controller.move(twin.target, QUICK_S)), name)
+        await self._ready(controller)
+        await controller.move(twin.target, QUICK_S)
+        assert await self._is_at(controller, twin, twin.target)
+
+    @against_twin
+    async def test_no_number_is_refused(self, controller: Controller, twin: ControllerTwin) -> None:
+        start = await self._ready(controller)
+        for pose in (replace(twin.target, z=math.nan), replace(twin.target, a=math.inf)):
+            refused = await failure(lambda pose=pose: controller.move(pose, QUICK_S))  # type: ignore[misc]
+            assert isinstance(refused, MoveRefused), refused
+        assert await self._is_at(controller, twin, start)
+        await controller.move(twin.target, QUICK_S)
+
+    @against_twin
     async def test_unreachable_pose_is_refused(self, controller: Controller, twin: ControllerTwin) -> None:
         start = await self._ready(controller)
         refused = await failure(lambda: controller.move(twin.out_of_reach, QUICK_S))
@@ -77,6 +133,47 @@ class ControllerConformance(Suite[Controller, ControllerTwin]):
         await controller.stop()
         [error] = await asyncio.gather(moving, return_exceptions=True)
         assert isinstance(error, MotionInterrupted), error
+        await self._require_at_rest(controller, twin)
+        await controller.move(twin.target, QUICK_S)
+
+    @against_twin
+    async def test_a_second_stop_is_harmless(self, controller: Controller, twin: ControllerTwin) -> None:
+        start = await self._ready(controller)
+        await controller.stop()
+        assert await self._is_at(controller, twin, start)
+        moving = await self._begun(controller, twin)
+        await asyncio.gather(controller.stop(), controller.stop())
+        await controller.stop()
+        [error] = await asyncio.gather(moving, return_exceptions=True)
+        assert isinstance(error, MotionInterrupted), error
+        await self._require_at_rest(controller, twin)
+        await controller.move(twin.target, QUICK_S)
+
+    @against_twin
+    async def test_a_stop_ends_what_waits(self, controller: Controller, twin: ControllerTwin) -> None:
+        name = (await controller.open()).name
+        start = await self._ready(controller)
+        moving = await self._begun(controller, twin)
+        waiting = asyncio.create_task(controller.move(start, QUICK_S))
+        await asyncio.sleep(0)
+        await controller.stop()
+        for error in await asyncio.gather(moving, waiting, return_exceptions=True):
+            require_named(error, name)
+        await self._require_at_rest(controller, twin)
+
+    @against_twin
+    async def test_a_stop_finds_it_after_the_link_was_lost(
+        self, controller: Controller, twin: ControllerTwin
+    ) -> None:
+        name = (await controller.open()).name
+        await controller.prepare(ALL)
+        moving = await self._begun(controller, twin)
+        twin.inject("unplugged", on=True)
+        [error] = await asyncio.gather(moving, return_exceptions=True)
+        require_named(error, name)
+        twin.inject("unplugged", on=False)
+        await controller.stop()
+        await self._ready(controller)
         await self._require_at_rest(controller, twin)
         await controller.move(twin.target, QUICK_S)
 
@@ -98,6 +195,18 @@ class ControllerConformance(Suite[Controller, ControllerTwin]):
         require_named(error, name)
         assert (await controller.status()).estop
         require_named(await failure(lambda: controller.move(twin.target, QUICK_S)), name)
+
+    @against_twin
+    async def test_a_later_emergency_stop_is_another(
+        self, controller: Controller, twin: ControllerTwin
+    ) -> None:
+        await self._ready(controller)
+        twin.inject("emergency stop", on=True)
+        refused = await failure(lambda: controller.prepare(ALL - {StartupAction.RESET_ESTOP}))
+        assert isinstance(refused, StartupNotPermitted), refused
+        assert refused.needed is StartupAction.RESET_ESTOP
+        await controller.prepare(ALL)
+        await controller.move(twin.target, QUICK_S)
 
     @against_twin
     async def test_a_reload_moves_no_joint(self, controller: Controller, twin: ControllerTwin) -> None:
@@ -128,6 +237,8 @@ class ControllerConformance(Suite[Controller, ControllerTwin]):
         await self._ready(controller)
         await controller.close()
         await controller.close()
+        for call in (controller.status, controller.position):
+            assert isinstance(await failure(call), DeviceError)
         await self._ready(controller)
         await controller.move(twin.target, QUICK_S)
 
@@ -144,9 +255,7 @@ class ControllerConformance(Suite[Controller, ControllerTwin]):
         return reported.pose
 
     async def _is_at(self, controller: Controller, twin: ControllerTwin, pose: Pose) -> bool:
-        millimetres, degrees = pose_difference(await self._pose(controller), pose)
-        settings = twin.settings
-        return millimetres <= settings.position_tolerance_mm and degrees <= settings.angle_tolerance_deg
+        return agree(await self._pose(controller), pose, twin.settings)
 
     async def _begun(self, controller: Controller, twin: ControllerTwin) -> asyncio.Task[None]:
         """A slow move; it is on its way if the controller has a heartbeat that shows it."""

@@ -7,6 +7,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from drivers.controllers.adapter.options import AdapterOptions
+from drivers.simulated.adapter import SimulatedAdapter
 from drivers.simulated.encoders.bank import Positions, SimulatedDbcBank, SimulatedEncoderBank
 from drivers.simulated.encoders.modbus_bank import SimulatedModbusBank
 from drivers.simulated.fault_schedule import CellFaults, FaultSchedule
@@ -135,14 +137,20 @@ class SimulatedCell(ServedGroup):
                 SimulatedSensors(settings, self.physics, clock, other_processes=other_processes)
             )
             self.gauges, self.encoders = sensors.gauges, sensors.encoders
-            self.controller = served.enter_context(SimulatedController(self.machine, settings.controller))
+            options = settings.controller.options  # a program that is started finds LinuxCNC behind it
+            is_adapter = isinstance(options, AdapterOptions) and options.address is not None
+            kind = SimulatedAdapter if is_adapter else SimulatedController
+            self.controller = served.enter_context(kind(self.machine, settings.controller))
             warmth = SimulatedThermometers(settings.thermometers, self.physics.celsius)
             served.enter_context(warmth)
             self.faults = CellFaults(self.gauges, self.encoders, self.controller, self.machine, stop_file)
             self.schedule = served.enter_context(FaultSchedule(self.faults, clock, simulation.faults))
             self.physics.on_motion_start = self.schedule.on_motion_start
             self._served = served.pop_all()
-        address = {"host": "127.0.0.1", "port": self.controller.port, "startup": simulation.startup}
+        address: dict[str, object] = {"host": "127.0.0.1", "port": self.controller.port}
+        if is_adapter:
+            address = {"options": AdapterOptions(address=f"127.0.0.1:{self.controller.port}")}
+        address["startup"] = simulation.startup
         controller = settings.controller.model_copy(update=address)
         guards = settings.guards.model_copy(update={"stop_file": str(stop_file)})
         self.settings = sensors.addressed(settings).model_copy(

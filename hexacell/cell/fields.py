@@ -172,7 +172,8 @@ SixInRange = Six[InRange]
 class Frozen(BaseModel):
     """A record that is kept in a file; no key is unknown, and NaN and infinity are numbers in JSON too."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, ser_json_inf_nan="constants")
+    # Each model is built when it is used first: a screen that starts needs few of them.
+    model_config = ConfigDict(extra="forbid", frozen=True, ser_json_inf_nan="constants", defer_build=True)
 
 
 class Section(Frozen):

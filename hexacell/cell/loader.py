@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from pydantic import SecretStr, ValidationError
-from pydantic.json_schema import models_json_schema
 
 from hexacell.cell.by_mechanism import cell_model
 from hexacell.cell.diagnostics import Diagnosis
@@ -20,7 +19,7 @@ from hexacell.cell.fields import Section
 from hexacell.cell.model import CellSettings
 from hexacell.cell.robot import DEFAULT_CONTROLLER, DEFAULT_MECHANISM, ControllerOptions
 from hexacell.errors import FileError, HexacellError, UsageError, did_you_mean, joined
-from hexacell.plugins import Group, load, names
+from hexacell.plugins import Group, PluginFailed, broken, load, names
 from hexacell.storage import toml_document
 from hexacell.storage.atomic_files import read_text
 
@@ -87,14 +86,14 @@ def config_paths(settings: CellSettings, folder: Path) -> tuple[Path, ...]:
     return (folder / controller.config, *(folder / one.config for one in controller.further_files))
 
 
-def load_cell(path: Path) -> Cell:
+def load_cell(path: Path | str) -> Cell:
     """The cell of a TOML file: settings with every default filled in, and the text with all lines.
 
     Raises:
         FileError: it cannot be read, is no TOML, or has one mistake.
         SeveralErrors: it has more than one; each of ``errors`` is a FileError with its line.
     """
-    return checked_cell(path, read_text(path, LARGEST_FILE_BYTES))
+    return checked_cell(Path(path), read_text(Path(path), LARGEST_FILE_BYTES))
 
 
 def checked_cell(path: Path, text: str) -> Cell:
@@ -122,12 +121,15 @@ def require_plugins(cell: Cell) -> None:
 
     Raises:
         FileError: one is not installed; the message has its line and names the most similar one.
-        SeveralErrors: more than one.
+        PluginFailed: one cannot be imported.
+        SeveralErrors: more than one of these.
     """
     failures: list[HexacellError] = []
     for path, group, name in sorted(_plugins(cell.settings), key=lambda one: one[1].value):
         try:
             load(group, name)
+        except PluginFailed as error:
+            failures.append(error)
         except HexacellError as error:
             line = cell.document.line_of(path)
             failures.append(FileError(error.problem, subject=cell.path, line=line, action=error.action))
@@ -168,6 +170,8 @@ def settings_document(cell: Cell) -> dict[str, Any]:
 
 def schema() -> dict[str, Any]:
     """The JSON Schema of a cell file, for editors and other programs, with each controller's options."""
+    from pydantic.json_schema import models_json_schema  # noqa: PLC0415 - only for this
+
     found = cell_model(DEFAULT_MECHANISM, encoder_scales=False).model_json_schema()
     each = dict.fromkeys(controller_options(one) for one in names(Group.CONTROLLERS))
     refs, definitions = models_json_schema([(one, "validation") for one in each])
@@ -219,14 +223,16 @@ def _model(document: toml_document.TomlDocument) -> type[CellSettings]:
 
 
 def _options(document: toml_document.TomlDocument) -> type[ControllerOptions]:
-    """The options of the controller's protocol; one that is not installed is reported with the devices."""
+    """The options of the controller's protocol; without any, an absent one is told with the devices."""
     stated = document.data.get("controller")
-    protocol = stated.get("protocol", DEFAULT_CONTROLLER) if isinstance(stated, dict) else None
-    if protocol == DEFAULT_CONTROLLER or protocol not in names(Group.CONTROLLERS):
+    section = stated if isinstance(stated, dict) else {}
+    protocol = section.get("protocol", DEFAULT_CONTROLLER)
+    is_absent = protocol not in names(Group.CONTROLLERS) and not section.get("options")
+    if protocol == DEFAULT_CONTROLLER or not isinstance(protocol, str) or is_absent:
         return ControllerOptions  # the default has none, and its driver takes a while to be imported
     try:
         return controller_options(protocol)
-    except HexacellError as error:
+    except UsageError as error:
         raise document.error(("controller", "protocol"), error.problem, error.action or "") from error
 
 
@@ -234,14 +240,13 @@ def controller_options(protocol: str) -> type[ControllerOptions]:
     """The options of a controller's protocol: ``Options`` of its driver, if it has any.
 
     Raises:
-        UsageError: there is no such driver, it cannot be imported, or has options that are no
-            ``ControllerOptions``.
+        UsageError: there is no such driver.
+        PluginFailed: it cannot be imported, or has options that are no ``ControllerOptions``.
     """
     options = getattr(load(Group.CONTROLLERS, protocol), "Options", ControllerOptions)
     if not (isinstance(options, type) and issubclass(options, ControllerOptions)):
-        raise UsageError(
-            f"the Options of controller protocol '{protocol}' are no ControllerOptions",
-            action="Derive them from hexacell.cell.robot.ControllerOptions, or inform the driver's maker",
+        raise broken(
+            Group.CONTROLLERS, protocol, "its Options are no hexacell.cell.robot.ControllerOptions"
         )
     return options
 

@@ -11,7 +11,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from hexacell.cli.console import Console
 from hexacell.printable import printable
-from hexacell.run_process.live_devices import RunDeviceWatch
+from hexacell.run_process.run_device_watch import RunDeviceWatch
 from hexacell.text.layout import wrapped
 from hexacell.text.line_face import EventFormatter, activity, gauges_text, record_text
 from procedures.run.cancellation import cancel_and_wait

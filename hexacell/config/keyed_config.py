@@ -75,7 +75,7 @@ def _filled(pattern: str, values: Mapping[str, str | int]) -> str:
     except (KeyError, IndexError, ValueError, AttributeError) as error:
         raise UsageError(
             f"config_options: {pattern!r} is not a pattern of names",
-            action="It may contain {leg}, {index}, {symbol}, {component} and {COMPONENT}",
+            action="It may contain {leg}, {index}, {symbol}, {component}, {COMPONENT} and {axis}",
         ) from error
 
 
@@ -90,6 +90,7 @@ def _keys_by(patterns: Mapping[str, str], every: Iterable[GeometricParameter]) -
                 "index": one.leg - 1,
                 "component": one.component,
                 "COMPONENT": one.component.upper(),
+                "axis": "xyz".find(one.component),
             },
         )
         for one in every

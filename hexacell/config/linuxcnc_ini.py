@@ -105,7 +105,7 @@ _SECTION = re.compile(r"[ \t]*\[(?P<name>[^\]\n]*)(?P<close>\])?")
 _VARIABLE = re.compile(
     r"[ \t]*(?P<name>[^=\s#;\[][^=\s]*)(?:[ \t][^=\n]*)?(?:=[ \t]*(?P<value>.*?))?[ \t\r]*(?:\n|\Z)"
 )
-_INCLUDE = re.compile(r"(?m)^#INCLUDE[ \t]+(.*?)[ \t\r]*$")
+INCLUDE = re.compile(r"(?m)^#INCLUDE[ \t]+(.*?)[ \t\r]*$")
 _NUMBER_AND_MORE = re.compile(r"(?P<number>[-+.\deE]+)[ \t]+(?P<more>.+)")
 
 
@@ -256,7 +256,7 @@ def limits_of_ini(path: Path, unit_mm: float = 1.0) -> interface.ControllerLimit
     """
     text = atomic_files.read_text(path, interface.LARGEST_CONFIG_BYTES)
     found = limits_in(IniText(text, path, ""), unit_mm)
-    for more in filter(Path.is_file, (path.parent / name for name in _INCLUDE.findall(text))):
+    for more in filter(Path.is_file, (path.parent / name for name in INCLUDE.findall(text))):
         included = IniText(atomic_files.read_text(more, interface.LARGEST_CONFIG_BYTES), more, "")
         found = found.narrowed(limits_in(included, unit_mm))
     return found

@@ -43,7 +43,7 @@ LARGEST_FILE_BYTES = 5_000_000
 csv.field_size_limit(LARGEST_FILE_BYTES)  # a column that is ignored may hold anything
 
 
-def read_measurements(path: Path, *, allow_partial: bool = False) -> MeasurementSet:
+def read_measurements(path: Path | str, *, allow_partial: bool = False) -> MeasurementSet:
     """Read the records of a measurement file, in the order of its rows.
 
     With ``allow_partial`` it may be of an unfinished calibration: without rows, or even without a header,
@@ -53,9 +53,15 @@ def read_measurements(path: Path, *, allow_partial: bool = False) -> Measurement
         FileError: the file cannot be read, a column is missing, a cell is not a number, a record occurs
             twice, the times of a point go back, or there are too few; with the line.
     """
+    path = Path(path)
     text = read_text(path, LARGEST_FILE_BYTES)
     if allow_partial and not text.strip():
         return MeasurementSet(())
+    return measurements_in(path, text, allow_partial=allow_partial)
+
+
+def measurements_in(path: Path, text: str, *, allow_partial: bool = False) -> MeasurementSet:
+    """The records in the text of a measurement file; raises as ``read_measurements`` does."""
     records = _records(path, text, HEADER)
     if not allow_partial and not records:
         raise FileError("there are no measurements in it", subject=path, action="Measure some first")

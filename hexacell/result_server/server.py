@@ -7,7 +7,6 @@ types of that specification, its structured data types and its methods among the
 
 import asyncio
 import logging
-import os
 from collections import deque
 from collections.abc import Callable
 from dataclasses import astuple, dataclass
@@ -16,20 +15,16 @@ from typing import Any, Self
 
 from asyncua import ua
 from asyncua.common.node import Node
-from asyncua.crypto import cert_gen
 from asyncua.crypto.permission_rules import User, UserRole
 from asyncua.server.event_generator import EventGenerator
 from asyncua.server.server import Server
-from cryptography import x509
-from cryptography.hazmat.primitives.serialization import Encoding
-from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from hexacell.cell.loader import Cell
 from hexacell.cell.operation import OpcUaSettings
 from hexacell.cell.passwords import Login, stated_login
 from hexacell.errors import DeviceError, UsageError
 from hexacell.result_server.published_result import SEVERITIES, NewResults, PublishedResult
-from hexacell.storage import atomic_files
+from hexacell.storage.opcua_certificate import ensure_certificate
 
 URI = "urn:hexacell:result-server"
 NAMESPACE = "urn:hexacell:results"
@@ -53,8 +48,6 @@ META_DATA = 6
 """The first fields are those of ResultMetaData, the others those of ResultContent."""
 
 VARIABLES = {"user": "HEXACELL_OPCUA_USER", "password": "HEXACELL_OPCUA_PASSWORD"}
-CERTIFICATE, KEY = "certificate.der", "private-key.pem"
-VALID_DAYS = 3650
 LOGIN_S = 5.0
 """So long a connection may last without a login; asyncua keeps all that is sent on it."""
 
@@ -93,32 +86,6 @@ def allowed_reader(settings: OpcUaSettings, folder: Path) -> Reader:
         subject="[opcua]",
         action=f"Name a password_file, or set {' and '.join(VARIABLES.values())}",
     )
-
-
-def ensure_certificate(folder: Path, uri: str, host: str) -> tuple[Path, Path]:
-    """The server's certificate and private key, made where absent; only the owner can read the key.
-
-    Raises:
-        FileError: they cannot be written.
-    """
-    certificate, key = folder / CERTIFICATE, folder / KEY
-    if not (certificate.is_file() and key.is_file()):
-        atomic_files.create_folder_durably(folder)
-        private_key = cert_gen.generate_private_key()
-        made = cert_gen.generate_self_signed_app_certificate(  # as OPC 10000-6, 6.2.2 has it
-            private_key,
-            "hexacell",
-            {},
-            [x509.UniformResourceIdentifier(uri), x509.DNSName(host)],
-            extended=[ExtendedKeyUsageOID.SERVER_AUTH],
-            days=VALID_DAYS,
-        )
-        with atomic_files.os_errors("cannot be written", key):
-            key.unlink(missing_ok=True)
-            with os.fdopen(os.open(key, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as stream:
-                stream.write(cert_gen.dump_private_key_as_pem(private_key))
-        atomic_files.write_own(certificate, made.public_bytes(Encoding.DER))
-    return certificate, key
 
 
 class ResultNodes:

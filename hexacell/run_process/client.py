@@ -5,18 +5,23 @@ import os
 import subprocess
 import tempfile
 from asyncio import StreamReader, StreamWriter
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncGenerator, AsyncIterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from subprocess import DEVNULL, PIPE
 from typing import BinaryIO, Protocol
 
+from hexacell.cell.loader import Cell
 from hexacell.errors import ExitCode, FileError, HexacellError
 from hexacell.python_process import python_command
 from hexacell.run_process import messages as protocol
-from hexacell.run_process.run_socket import peer_of
+from hexacell.run_process.run_socket import peer_of, socket_path
+from hexacell.runs.run_folder import RunFolder, new_run
+from hexacell.services.history.resumption import LATEST, run_to_resume
 from hexacell.storage.atomic_files import read_end
+from procedures.calibration.calibration import Mode
 from procedures.engine.commands import Command
+from procedures.journal.journal import read_journal
 from procedures.steps import events
 
 READY = b"ready\n"
@@ -61,8 +66,8 @@ class RunConnection(Protocol):
         ...
 
 
-class HostNotStarted(HexacellError):
-    """The process of a run could not begin; the exit code is that of the reason."""
+class RunFailed(HexacellError):
+    """A run could not begin, or ended early; the exit code is that of the reason."""
 
     def __init__(self, failure: protocol.HostFailed) -> None:
         super().__init__(failure.problem, action=failure.action or None)
@@ -78,7 +83,7 @@ class HostConnection:
         self._is_left = False
         self._goes_on_alone = False
 
-    async def messages(self) -> AsyncIterator[protocol.HostMessage]:
+    async def messages(self) -> AsyncGenerator[protocol.HostMessage, None]:
         """Everything that the run sends; a connection that is lost ends with a failure."""
         has_ended = False
         with suppress(ConnectionError):
@@ -142,12 +147,30 @@ async def connect_to_run(path: Path) -> HostConnection | None:
     return HostConnection(reader, writer)
 
 
+async def begin_run(cell: Cell, mode: Mode, *, length_check: bool = False) -> HostConnection:
+    """Begin a run in a process of its own; raises ``HexacellError``."""
+    return await _start(cell, new_run(cell), mode.value, ["--length-check"] if length_check else [])
+
+
+async def resume_run(cell: Cell, named: str = LATEST) -> HostConnection:
+    """Resume an interrupted run, the latest by default, in a process; raises ``HexacellError``."""
+    folder = run_to_resume(cell, named)
+    started = next(iter(read_journal(folder.journal)), None)
+    mode = started.mode if isinstance(started, events.RunStarted) else Mode.OPTIMISE.value
+    return await _start(cell, folder, mode, ["--resume"])
+
+
+async def _start(cell: Cell, folder: RunFolder, mode: str, more: Sequence[str]) -> HostConnection:
+    arguments = [str(cell.path), "--mode", mode, "--folder", str(folder.path), *more]
+    return await start_host(socket_path(cell), arguments)
+
+
 async def start_host(path: Path, arguments: Sequence[str]) -> HostConnection:
-    """Start ``hexacell host`` and connect to it at ``path``; raises ``HostNotStarted``."""
+    """Start ``hexacell host`` and connect to it at ``path``; raises ``RunFailed``."""
     await asyncio.to_thread(_spawn, arguments)
     connection = await connect_to_run(path)
     if connection is None:
-        raise HostNotStarted(protocol.HostFailed(problem="the run's process ended at once"))
+        raise RunFailed(protocol.HostFailed(problem="the run's process ended at once"))
     return connection
 
 
@@ -159,7 +182,7 @@ def _spawn(arguments: Sequence[str]) -> None:
             command, stdin=DEVNULL, stdout=PIPE, stderr=errors, start_new_session=True, check=False
         ).stdout
         if answer != READY:
-            raise HostNotStarted(_failure_in(answer, errors))
+            raise RunFailed(_failure_in(answer, errors))
 
 
 def _failure_in(answer: bytes, errors: BinaryIO) -> protocol.HostFailed:

@@ -13,7 +13,7 @@ from hexacell.errors import ExitCode, HexacellError
 from hexacell.plugins import plugin_failures_named
 from hexacell.run_process import messages
 from hexacell.run_process.audience import Audience
-from hexacell.run_process.live_devices import RunDeviceWatch
+from hexacell.run_process.run_device_watch import RunDeviceWatch
 from hexacell.services.run.calibration_run import RunRequest, calibrate
 from procedures.calibration.calibration import expected_records
 from procedures.devices.device_set import Devices

@@ -7,90 +7,42 @@ screens, never for records.
 """
 
 from datetime import datetime
+from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Generic, Literal, TypeVar, get_args
+from typing import Annotated, Any, Literal, TypeVar, get_args
 
 from pydantic import BeforeValidator, Field, PlainSerializer, TypeAdapter, ValidationError
 
-from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.cell.fields import Frozen, first_mistake
 from hexacell.errors import UsageError
+from hexacell.run_process.live_snapshot import LiveSnapshot
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Command
 from procedures.run.questions import Question
 from procedures.steps.events import Event
 
 Message = TypeVar("Message")
-Value = TypeVar("Value")
 
 LONGEST_MESSAGE = 16 << 20
 """Bytes of one line; no message comes near it."""
 
-_COMMANDS: dict[str, TypeAdapter[Any]] = {
-    command.__name__: TypeAdapter(command) for command in get_args(Command)
-}
+
+@cache  # none of these adapters is made before a run is there: each takes a screen some milliseconds
+def _commands() -> dict[str, TypeAdapter[Any]]:
+    return {command.__name__: TypeAdapter(command) for command in get_args(Command)}
 
 
 def _command_document(command: Command) -> dict[str, Any]:
     name = type(command).__name__
-    fields: dict[str, Any] = _COMMANDS[name].dump_python(command, mode="json")
+    fields: dict[str, Any] = _commands()[name].dump_python(command, mode="json")
     return {"name": name, **fields}
 
 
 def _command_in(value: object) -> object:
     """The command of a document; anything else is left to be refused."""
-    if not isinstance(value, dict) or value.get("name") not in _COMMANDS:
+    if not isinstance(value, dict) or value.get("name") not in _commands():
         return value
-    return _COMMANDS[value["name"]].validate_python({k: v for k, v in value.items() if k != "name"})
-
-
-class Shown(Frozen, Generic[Value]):
-    """What a device showed last, how long ago, s, and why it did not answer since; empty if it did.
-
-    Value and age are None before its first answer.
-    """
-
-    value: Value | None = None
-    age_s: float | None = None
-    problem: str = ""
-
-
-class GaugeSnapshot(Frozen):
-    """One gauge, mm in its own zero and direction.
-
-    Attributes:
-        axis: the base axis along which its plunger moves.
-        sign: 1 where its reading grows along the positive axis, else -1.
-        shown_mm: its latest reading; None before the first one.
-        unit: the display's unit; a gauge that shows another one is refused, and ``problem`` says so.
-        noise_mm: standard deviation of its latest readings at standstill; None before there are some.
-        travel_mm: its measuring range.
-        middle_mm: what it shows in the middle of that; None where its display does not say.
-    """
-
-    name: str
-    axis: Literal["x", "y", "z"]
-    sign: Literal[1, -1] = 1
-    shown_mm: float | None = None
-    unit: Literal["mm"] = "mm"
-    age_s: float | None = None
-    noise_mm: float | None = None
-    problem: str = ""
-    travel_mm: float
-    middle_mm: float | None = None
-
-
-class LiveSnapshot(Frozen):
-    """The latest values of all devices; at most ten a second, and none is kept for a slow reader.
-
-    ``stop_reason`` is why motion is forbidden, empty while it is not.
-    """
-
-    kind: Literal["live"] = "live"
-    gauges: tuple[GaugeSnapshot, ...]
-    encoders: Shown[EncoderSample] = Field(default_factory=Shown[EncoderSample])
-    controller: Shown[ControllerStatus] = Field(default_factory=Shown[ControllerStatus])
-    stop_reason: str = ""
+    return _commands()[value["name"]].validate_python({k: v for k, v in value.items() if k != "name"})
 
 
 class RunDescribed(Frozen):
@@ -202,8 +154,15 @@ HostMessage = Annotated[
 ]
 ClientMessage = Annotated[GiveCommand | TakeControl | Leave, Field(discriminator="kind")]
 
-_FROM_HOST: TypeAdapter[HostMessage] = TypeAdapter(HostMessage)
-_FROM_CLIENT: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)
+
+@cache
+def _from_host() -> TypeAdapter[HostMessage]:
+    return TypeAdapter(HostMessage)
+
+
+@cache
+def _from_client() -> TypeAdapter[ClientMessage]:
+    return TypeAdapter(ClientMessage)
 
 
 def message_line(message: HostMessage | ClientMessage) -> bytes:
@@ -213,12 +172,12 @@ def message_line(message: HostMessage | ClientMessage) -> bytes:
 
 def host_message(line: bytes) -> HostMessage:
     """The message in a line from the host; raises ``UsageError`` if it is not one."""
-    return _read(_FROM_HOST, line)
+    return _read(_from_host(), line)
 
 
 def client_message(line: bytes) -> ClientMessage:
     """The message in a line from a client; raises ``UsageError`` if it is not one."""
-    return _read(_FROM_CLIENT, line)
+    return _read(_from_client(), line)
 
 
 def _read(known: TypeAdapter[Message], line: bytes) -> Message:

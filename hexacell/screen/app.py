@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import re
+import time
 from collections.abc import Callable, Coroutine, Iterable
 from contextlib import suppress
 from functools import partial
@@ -21,10 +23,11 @@ from hexacell.printable import printable
 from hexacell.screen import overlays, tabs
 from hexacell.screen.further_screens import AssistantScreen, CellFileScreen, DigitsScreen, PlanScreen
 from hexacell.screen.preferences import KEYS, ONCE, SCREEN_THEMES, THEMES, ScreenAction, ScreenPreferences
-from hexacell.screen.widgets import KeyLine
+from hexacell.screen.widgets import CardGrid, KeyLine
 from hexacell.text.screens.views import FaultView
 
 if TYPE_CHECKING:
+    from hexacell.screen.first_values import FirstValues
     from hexacell.screen.model import ScreenModel
     from hexacell.text.screens.first_questions import FirstCellAssistant
 
@@ -39,6 +42,12 @@ CALL = re.compile(r"(?:app\.)?perform\('([^']*)'(?:, '([^']*)')?\)")
 
 MADE_EVERY_S = 0.04
 """Pause after each screen that is made behind the first one, s: for what else is to be done meanwhile."""
+
+MADE_AFTER_S = 0.2
+"""How long nobody has asked for a screen before one is made behind the first one, s."""
+
+KNOWN_AFTER_S = 1.0
+"""Longest wait for the first values of the devices before the rest is loaded, s."""
 
 SHOWN_AFTER_S = 0.01
 """Another screen is drawn so much later than asked for, s, which is made before."""
@@ -81,11 +90,13 @@ class TechnicianApp(App[int]):
         preferences: ScreenPreferences | None = None,
         *,
         first_cell: Path | None = None,
+        first_values: FirstValues | None = None,
     ) -> None:
         self.preferences = preferences or ScreenPreferences()
         self.keys_in_use = {str(one.id): one.key_display or one.key for one in KEYS} | self.preferences.keys
-        self._load, self._first_cell = load, first_cell
+        self._load, self._first_cell, self._first_values = load, first_cell, first_values
         self.model: ScreenModel | None = None
+        self._shown_at = 0.0
         self._question_seen, self._fault_seen, self._runs_seen, self._refusals_seen = 0, 0, 0, 0
         super().__init__()
         for theme in SCREEN_THEMES:
@@ -93,11 +104,25 @@ class TechnicianApp(App[int]):
         for screen in SCREENS:
             self.add_mode(screen.TAB, partial(screen, self.keys_in_use))
         self.theme = self.preferences.theme
+        self.stylesheet.set_variables(self.get_css_variables())  # before it is read for the first time
         self.set_keymap(self.preferences.keys)
 
     def delay_update(self, delay: float = SHOWN_AFTER_S) -> None:
         """Draw nothing while a screen takes another one's place: Textual waits until one could be made."""
         super().delay_update(delay)
+
+    def refresh_css(self, animate: bool = True) -> None:
+        """Style the screens anew where the one in front was styled for another theme.
+
+        Textual asks for it at the first visit of each screen too, and then reads all styles again.
+        """
+        front = self.screen_stack[-1] if self.screen_stack else None
+        if isinstance(front, tabs.TabScreen) and front.theme_of_styles == self.theme:
+            return
+        super().refresh_css(animate=animate)
+        for screen in self.screen_stack:
+            if isinstance(screen, tabs.TabScreen):
+                screen.theme_of_styles = self.theme
 
     def on_mount(self) -> None:
         """Load what is behind the screens once the first one is drawn."""
@@ -111,14 +136,32 @@ class TechnicianApp(App[int]):
                 self.exit(0)
                 return
             with plugin_failures_named():
+                if self._first_values is not None:
+                    await self._show_first(self._first_values)
                 self.model = await asyncio.to_thread(self._load)
+            gc.freeze()  # what is loaded stays: to look through it for garbage would keep keys waiting
             self.draw()
             self.set_interval(AGES_EVERY_S, self.draw)
             self.run_worker(self._draw_changes(self.model), exit_on_error=False, group="draw")
-            self.run_worker(self._make_screens(), exit_on_error=False, group="make")
+            self.run_worker(self._make_screens(self.model), exit_on_error=False, group="make")
             await self.model.attend()
         except HexacellError as error:
             self._show_error(error)
+
+    async def _show_first(self, values: FirstValues) -> None:
+        """Show what the devices show, before anything else that takes time; not what they do not show."""
+        known = asyncio.Event()
+
+        def drawn() -> None:
+            self.draw()
+            if values.are_known:
+                known.set()
+
+        await asyncio.to_thread(values.load, drawn)
+        values.start()
+        with suppress(TimeoutError):
+            async with asyncio.timeout(KNOWN_AFTER_S):
+                await known.wait()
 
     async def _draw_changes(self, model: ScreenModel) -> None:
         """Draw what has changed, all of it together that does so at about the same time."""
@@ -128,13 +171,22 @@ class TechnicianApp(App[int]):
             model.changed.clear()
             self.draw()
 
-    async def _make_screens(self) -> None:
-        """Make the screens behind the first one before somebody wants them, one at a time."""
+    async def _make_screens(self, model: ScreenModel) -> None:
+        """Make the screens behind the first one before somebody wants them, then draw the robot."""
         for screen in SCREENS[1:]:
+            await self._nobody_asks()
             if self.is_running:  # what is being closed must not grow
                 # To Textual it is as if one had gone there and come back, without a frame in between.
                 await self._init_mode(screen.TAB)
                 await asyncio.sleep(MADE_EVERY_S)
+        await model.draw_robot()
+
+    async def _nobody_asks(self) -> None:
+        """Wait until nobody has asked for a screen for a while."""
+        rest = self._shown_at + MADE_AFTER_S - time.monotonic()
+        if rest > 0.0:
+            await asyncio.sleep(rest)
+            await self._nobody_asks()
 
     async def _has_cell(self) -> bool:
         """Whether there is a cell file, once the first-time assistant was used if it is needed."""
@@ -146,7 +198,11 @@ class TechnicianApp(App[int]):
 
     def draw(self) -> None:
         """Show what is so now in the screen in front, and in what lies below it."""
-        if self.model is None or not self.screen_stack:  # it is loading, or being closed
+        if not self.screen_stack:  # it is being closed
+            return
+        if self.model is None:  # it is loading
+            if self._first_values is not None and isinstance(self.screen, tabs.CellScreen):
+                self.screen.query_one(CardGrid).show(self._first_values.cards())
             return
         for screen in self.screen_stack:
             with suppress(NoMatches):  # it is being composed, or taken away
@@ -233,6 +289,7 @@ class TechnicianApp(App[int]):
 
     def action_show(self, tab: str) -> None:
         """Go to another screen."""
+        self._shown_at = time.monotonic()
         self.switch_mode(tab)
         self.draw()
 

@@ -4,20 +4,20 @@ import asyncio
 import time
 from collections.abc import Callable
 from operator import is_
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hexacell.cell.loader import describe
 from hexacell.errors import UsageError
-from hexacell.run_process.messages import LiveSnapshot
+from hexacell.run_process.live_snapshot import LiveSnapshot
 from hexacell.run_process.recorded import RecordedRun
+from hexacell.screen.device_watcher import DeviceWatcher
 from hexacell.screen.preferences import RESUME, WITH_LENGTH, ScreenAction
 from hexacell.screen.readiness import Readiness
 from hexacell.screen.run_history import RunHistory
 from hexacell.screen.shown_devices import ShownDevices
-from hexacell.screen.watching import DeviceWatcher, RunFollower
+from hexacell.screen.watching import RunFollower
 from hexacell.screen.workplace import Workplace
 from hexacell.services.history.run_index import PastRun
-from hexacell.services.robot_view import first_scene
 from hexacell.text.screens import banner, reviewing
 from hexacell.text.screens.devices import cell_facts, device_cards
 from hexacell.text.screens.measuring import (
@@ -36,6 +36,9 @@ from procedures.engine.commands import Abort, Answer, MeasureAgain, Pause, Resum
 from procedures.run.questions import StepFailure
 from procedures.steps import events
 
+if TYPE_CHECKING:
+    from hexacell.drawing.shapes import Scene
+
 SPEEDS = (0.0, 1.0, 10.0, 60.0, 600.0)
 """Speeds of a recorded run, as multiples of that at which it was recorded; the first is standstill."""
 
@@ -46,23 +49,33 @@ class ScreenModel:
     The views are those of this moment and cost a few milliseconds at most; what takes longer is awaited.
     Everything that is awaited raises ``HexacellError``.
 
+    Args:
+        devices: who watches the devices already; nobody if None.
+
     Attributes:
         run: the run that is followed, live or recorded.
         devices: what the devices show.
         changed: set whenever there may be something else to show.
     """
 
-    def __init__(self, workplace: Workplace, now: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        workplace: Workplace,
+        now: Callable[[], float] = time.monotonic,
+        *,
+        devices: DeviceWatcher | None = None,
+    ) -> None:
         self._workplace = workplace
         self.changed = asyncio.Event()
         self.run = RunFollower(now, self._after_run, self.changed.set)
-        self._devices = DeviceWatcher(workplace.watch, now, self.changed.set)
+        self._devices = devices or DeviceWatcher(workplace.watch, now, self.changed.set)
+        self._devices.watch, self._devices.on_change = workplace.watch, self.changed.set
         self.devices = ShownDevices(self.run, self._devices, lambda: workplace.cell.settings, now)
         self._run_is_over = asyncio.Event()
         self._is_starting = False
         self._readiness = Readiness(workplace, self._devices)
         self._history = RunHistory(workplace, self._devices)
-        self._scene = first_scene(workplace.cell)
+        self._scene: Scene | None = None
         self._reviewed: tuple[tuple[object, ...], dict[str, tuple[Any, ...]]] | None = None
 
     async def attend(self) -> None:
@@ -72,6 +85,7 @@ class ScreenModel:
             if running is None:
                 self._devices.start()
             else:
+                await self._devices.stop()
                 await self.run.follow(running)
             while True:
                 await self._history.read()
@@ -85,6 +99,13 @@ class ScreenModel:
         """The devices are free, and there is one more run in the history."""
         self._devices.start()
         self._run_is_over.set()
+
+    async def draw_robot(self) -> None:
+        """Draw the robot for its screen, which takes a third of a second."""
+        from hexacell.services.robot_view import first_scene  # noqa: PLC0415 - scipy, after the values
+
+        self._scene = await asyncio.to_thread(first_scene, self._workplace.cell)
+        self.changed.set()
 
     # Views.
 

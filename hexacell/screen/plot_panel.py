@@ -41,40 +41,50 @@ def whole_numbers(low: float, high: float, most: int) -> list[float]:
 
 
 class PlotPanel(Vertical):
-    """A view as large as there is room, in a frame with its title and what each marker is."""
+    """A view as large as there is room, in a frame with its title and what each marker is.
+
+    The picture itself is made when there is something to draw.
+    """
 
     def __init__(self, *, id: str | None = None, classes: str = "") -> None:  # noqa: A002 - as in every widget
         super().__init__(id=id, classes=f"panel {classes}")
         self._drawn: tuple[PlotView, str] | None = None
         self._across = (0.0, 1.0)
+        self._plot: PlotWidget | None = None
 
     def on_resize(self) -> None:
         """Have as many values along the axis as there is room for."""
-        plot: PlotWidget = self.query_one(".plot")  # type: ignore[assignment]  # see compose
-        plot.set_xticks(whole_numbers(*self._across, most=max(2, self.size.width // 9)))
+        if self._plot is not None:
+            most = max(2, self.size.width // 9)
+            self._plot.set_xticks(whole_numbers(*self._across, most=most))
 
     def compose(self) -> ComposeResult:
-        """A note while there is nothing to draw, and the picture."""
-        from textual_plot import PlotWidget  # noqa: PLC0415 - needs numpy, after the first screen
-
+        """A note while there is nothing to draw."""
         yield TextPanel(classes="plot-note")
-        yield PlotWidget(allow_pan_and_zoom=False, classes="plot")
 
     def show(self, view: PlotView) -> None:
         """Show a view."""
-        plot: PlotWidget = self.query_one(".plot")  # type: ignore[assignment]  # see compose
-        # As it is mounted it forgets what it was given before.
-        if (view, self.app.theme) == self._drawn or not plot.is_mounted:
+        if (view, self.app.theme) == self._drawn:
+            return
+        note = self.query_one(".plot-note", TextPanel)
+        if self._plot is None and not view.is_empty:
+            from textual_plot import PlotWidget  # noqa: PLC0415 - needs numpy, after the first screen
+
+            self._plot = PlotWidget(allow_pan_and_zoom=False, classes="plot")
+            self.mount(self._plot)
+        if self._plot is not None and not self._plot.is_mounted:
+            # As it is mounted it forgets what it was given before.
+            self.call_after_refresh(self.show, view)
             return
         self._drawn = (view, self.app.theme)
         self.border_title = view.title
         self.border_subtitle = "" if view.is_empty else f"{view.legend}   → {view.x_label}"
-        note = self.query_one(".plot-note", TextPanel)
         note.show(view.note)
         note.display = view.is_empty
-        plot.display = not view.is_empty
-        if not view.is_empty:
-            self._draw(plot, view)
+        if self._plot is not None:
+            self._plot.display = not view.is_empty
+            if not view.is_empty:
+                self._draw(self._plot, view)
 
     def _draw(self, plot: PlotWidget, view: PlotView) -> None:
         plot.clear()

@@ -3,10 +3,10 @@
 import asyncio
 from typing import Any
 
-from hexacell.run_process.messages import LiveSnapshot
+from hexacell.run_process.live_snapshot import LiveSnapshot
 from hexacell.screen.child import TriedPlan
+from hexacell.screen.device_watcher import DeviceWatcher
 from hexacell.screen.preferences import ONCE
-from hexacell.screen.watching import DeviceWatcher
 from hexacell.screen.workplace import Workplace
 from hexacell.text.screens.checklist import (
     checked_items,

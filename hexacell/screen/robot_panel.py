@@ -28,12 +28,15 @@ class RobotPanel(Static):
 
     def on_resize(self) -> None:
         """Draw it as large as there is room now."""
+        if self._scene is None:
+            self.update("")
+            return
         from hexacell.drawing.braille import braille_lines  # noqa: PLC0415 - after the first screen
         from hexacell.drawing.shapes import COLOURS  # noqa: PLC0415 - see above
 
         room = self.content_region.size
-        if self._scene is None or room.width < FEWEST_COLUMNS or room.height < FEWEST_ROWS:
-            self.update("" if self._scene is None else "A larger window shows it.")
+        if room.width < FEWEST_COLUMNS or room.height < FEWEST_ROWS:
+            self.update("A larger window shows it.")
             return
         lines = braille_lines(self._scene, room.width, room.height)
         is_grey = self._theme == "monochrome"

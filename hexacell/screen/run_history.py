@@ -5,7 +5,7 @@ from typing import Any
 
 from hexacell.config.versions import ConfigEditedSince
 from hexacell.errors import HexacellError
-from hexacell.screen.watching import DeviceWatcher
+from hexacell.screen.device_watcher import DeviceWatcher
 from hexacell.screen.workplace import Workplace
 from hexacell.services.history.run_index import PastRun
 from hexacell.text.config_changes import RELOAD, versions_text

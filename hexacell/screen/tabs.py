@@ -16,19 +16,25 @@ from hexacell.screen.plot_panel import PlotPanel
 from hexacell.screen.preferences import WITH_LENGTH
 from hexacell.screen.robot_panel import RobotPanel
 from hexacell.screen.widgets import titled
+from hexacell.text.screens.table_columns import PARAMETER_COLUMNS, RECORD_COLUMNS, RUN_COLUMNS
 
 if TYPE_CHECKING:
     from hexacell.screen.model import ScreenModel
 
 
 class TabScreen(Screen[None]):
-    """One of the five screens."""
+    """One of the five screens.
+
+    Attributes:
+        theme_of_styles: the theme that it was styled for last.
+    """
 
     TAB: ClassVar[str]
 
     def __init__(self, keys: Mapping[str, str]) -> None:
         super().__init__()
         self._keys = keys
+        self.theme_of_styles = self.app.theme
 
     def compose(self) -> ComposeResult:
         """The first lines, the banner, what is its own, and the keys."""
@@ -104,8 +110,6 @@ class MeasureScreen(TabScreen):
     ]
 
     def _parts(self) -> ComposeResult:
-        from hexacell.text.screens.measuring import RECORD_COLUMNS  # noqa: PLC0415 - after the first screen
-
         with Vertical(id="upper"):
             yield titled(widgets.ProgressPanel(id="progress"), "Progress")
             yield titled(widgets.LinePanel(id="gauges"), "Gauges, deviation from the reference")
@@ -121,8 +125,6 @@ class ReviewScreen(TabScreen):
     AUTO_FOCUS = "#details"
 
     def _parts(self) -> ComposeResult:
-        from hexacell.text.screens.reviewing import PARAMETER_COLUMNS  # noqa: PLC0415 - see above
-
         with Vertical(id="outcome"):
             yield widgets.TextPanel(id="verdict")
             yield widgets.LinePanel(id="consequences")
@@ -153,8 +155,6 @@ class HistoryScreen(TabScreen):
     is_asked = False
 
     def _parts(self) -> ComposeResult:
-        from hexacell.text.screens.past_runs import RUN_COLUMNS  # noqa: PLC0415 - see above
-
         with Horizontal(id="sides"):
             yield titled(widgets.ChoiceTable(RUN_COLUMNS, id="runs"), "Runs, the latest first")
             yield PlotPanel(id="trend")

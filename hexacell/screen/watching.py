@@ -1,12 +1,11 @@
-"""What a screen follows: one run at a time, and the devices while no run has them."""
+"""The run that a screen follows: one at a time."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from collections.abc import Callable
 
 from hexacell.errors import HexacellError, UsageError
 from hexacell.run_process.client import RunConnection
-from hexacell.run_process.messages import HostFailed, HostMessage, LiveSnapshot, StatusChanged
+from hexacell.run_process.messages import HostFailed, HostMessage, StatusChanged
 from hexacell.text.screens.run_picture import RunPicture, picture_after
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Command
@@ -14,10 +13,6 @@ from procedures.run.cancellation import cancel_and_wait
 
 FEW_MESSAGES = 50
 """After so many at once, as on attaching, the screen is drawn before the next."""
-
-
-AGAIN_AFTER_S = 3.0
-"""Devices that could not be opened are tried again."""
 
 
 class RunFollower:
@@ -92,57 +87,3 @@ class RunFollower:
         if self.picture.question not in {None, question}:
             self.questions += 1
         self._on_change()
-
-
-class DeviceWatcher:
-    """Watches until it is stopped; lets the devices go while they are needed elsewhere.
-
-    Attributes:
-        live: the latest values, and ``live_at_s`` when they came.
-        problem: why there are no values; empty if there are.
-    """
-
-    def __init__(
-        self,
-        watch: Callable[[], AsyncIterator[LiveSnapshot]],
-        now: Callable[[], float],
-        on_change: Callable[[], None],
-    ) -> None:
-        self.live: LiveSnapshot | None = None
-        self.live_at_s = 0.0
-        self.problem = ""
-        self._watch, self._now, self._on_change = watch, now, on_change
-        self._task: asyncio.Task[None] | None = None
-
-    def start(self) -> None:
-        """Watch the devices, unless it does."""
-        if self._task is None:
-            self._task = asyncio.create_task(self._keep_watching())
-
-    async def stop(self) -> None:
-        """Let the devices go."""
-        task, self._task, self.live = self._task, None, None
-        if task is not None:
-            await cancel_and_wait(task)
-
-    @asynccontextmanager
-    async def released(self) -> AsyncIterator[None]:
-        """Within this context others may have the devices."""
-        was_watching = self._task is not None
-        await self.stop()
-        try:
-            yield
-        finally:
-            if was_watching:
-                self.start()
-
-    async def _keep_watching(self) -> None:
-        while True:
-            try:
-                async for snapshot in self._watch():
-                    self.live, self.live_at_s, self.problem = snapshot, self._now(), ""
-                    self._on_change()
-            except HexacellError as error:
-                self.live, self.problem = None, str(error)
-                self._on_change()
-            await asyncio.sleep(AGAIN_AFTER_S)

@@ -127,18 +127,18 @@ class CardPanel(Vertical):
         set_urgency(self, card.urgency)
 
 
-MOST_CARDS = 6
-
-
 class CardGrid(Widget):
     """A card for each device."""
 
     def __init__(self, *, id: str | None = None) -> None:  # noqa: A002 - as in every widget
-        self._cards = [CardPanel() for _ in range(MOST_CARDS)]
-        super().__init__(*self._cards, id=id)
+        self._cards: list[CardPanel] = []
+        super().__init__(id=id)
 
     def show(self, cards: Sequence[Card]) -> None:
         """Show the devices."""
+        if more := [CardPanel() for _ in cards[len(self._cards) :]]:
+            self._cards += more
+            self.mount(*more)
         for number, panel in enumerate(self._cards):
             panel.display = number < len(cards)
             if panel.display:

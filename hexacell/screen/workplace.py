@@ -9,17 +9,16 @@ from hexacell.cell.passwords import password_warnings
 from hexacell.config.pending_write import settle_config
 from hexacell.dry_run.campaign import VisitedPose
 from hexacell.errors import UsageError
-from hexacell.run_process.client import RunConnection, connect_to_run, start_host
+from hexacell.run_process.client import RunConnection, begin_run, connect_to_run, resume_run
 from hexacell.run_process.live_devices import watch_devices
-from hexacell.run_process.messages import LiveSnapshot
+from hexacell.run_process.live_snapshot import LiveSnapshot
 from hexacell.run_process.recorded import RecordedRun
 from hexacell.run_process.run_socket import socket_path
-from hexacell.runs.run_folder import find_run, new_run
+from hexacell.runs.run_folder import find_run
 from hexacell.screen.child import Preflight, TriedPlan, run_child
 from hexacell.screen.preferences import RESUME, WITH_LENGTH
 from hexacell.services.history.journal_soundness import read_sound
 from hexacell.services.history.past_runs import compare_runs, parameter_trends, past_runs
-from hexacell.services.history.resumption import LATEST, run_to_resume
 from hexacell.services.history.run_index import PastRun
 from hexacell.services.history.run_summary import is_applied_later
 from hexacell.services.preflight import exposure_warnings, toggle_exclusion
@@ -28,9 +27,7 @@ from hexacell.services.write_back.proposals import apply_proposal, approval_ques
 from hexacell.text.config_changes import applied_text, rollback_text
 from hexacell.text.history import comparison_text, drift_text
 from procedures.calibration.calibration import Mode
-from procedures.journal.journal import read_journal
 from procedures.run.questions import Question
-from procedures.steps.events import RunStarted
 
 
 def mode_of(what: str) -> Mode:
@@ -70,15 +67,8 @@ class Workplace:
     async def start(self, what: str) -> RunConnection:
         """Begin a run of a mode in a process of its own, or resume the latest interrupted one."""
         if what == RESUME:
-            folder = run_to_resume(self.cell, LATEST)
-            started = next(iter(read_journal(folder.journal)))
-            mode = started.mode if isinstance(started, RunStarted) else Mode.OPTIMISE.value
-            more = ["--resume"]
-        else:
-            folder, mode = new_run(self.cell), mode_of(what).value
-            more = ["--length-check"] if what == WITH_LENGTH else []
-        arguments = [str(self.cell.path), "--mode", mode, "--folder", str(folder.path), *more]
-        return await start_host(socket_path(self.cell), arguments)
+            return await resume_run(self.cell)
+        return await begin_run(self.cell, mode_of(what), length_check=what == WITH_LENGTH)
 
     async def check(self, what: str) -> Preflight:
         """Check everything that must hold before the motion of a mode; needs the devices."""

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from hexacell import services
 from hexacell.campaign import decisions, feasibility
 from hexacell.campaign.feasibility import unreachable_share
 from hexacell.campaign.planner import Plan
@@ -22,6 +21,7 @@ from hexacell.noise.measured_noise import AveragingForecast, with_measured_noise
 from hexacell.robot.model import robot_of
 from hexacell.robot.stated import stated_effects
 from hexacell.runs.run_folder import RunFolder
+from hexacell.services import search_effort
 from hexacell.services.design_facts import StatedPose, require_design, stated_poses
 from hexacell.verdict.assessment import Assessment, assess
 
@@ -156,7 +156,7 @@ def try_plan(cell: Cell) -> PlanTrial:
 
 def plan_of(cell: Cell) -> Plan:
     """The plan of a cell; raises ``FileError`` if its config or its list of poses cannot be read."""
-    return Plan(cell.settings, robot_of(cell), pose_list_of(cell), services.EFFORT)
+    return Plan(cell.settings, robot_of(cell), pose_list_of(cell), search_effort.EFFORT)
 
 
 def _state_of_records(plan: Plan, measurements: MeasurementSet, rejections: int) -> decisions.CampaignState:

@@ -25,7 +25,7 @@ from procedures.steps import events
 from procedures.steps.move import Move
 
 if TYPE_CHECKING:
-    from hexacell.run_process.messages import GaugeSnapshot, LiveSnapshot
+    from hexacell.run_process.live_snapshot import GaugeSnapshot, LiveSnapshot
 
 INDENT = 10
 """Width of the column with the time."""
@@ -90,6 +90,10 @@ class EventFormatter:
                 # Of the move before it, which predicted the error with this set.
                 forecast = wrapped(run_forecast_line(self._forecast), indent=2)
         return [text for text in (event_text(event, state), forecast) if text]
+
+    def story(self, event: events.Event, state: RunState) -> str:
+        """The same for whoever sees nothing else of the run: records and its end too."""
+        return "\n".join([*_own_words(event), *self.lines(event, state)])
 
     def status_text(self, expected: int) -> str:
         """Where the run is: what it does, how far it is, its last record, its accuracy and the time left.
@@ -156,9 +160,8 @@ def run_story(entries: Iterable[Entry]) -> Iterator[tuple[Entry, str]]:
     formatter, state = EventFormatter(), RunState()
     for entry in entries:
         state = apply(state, entry.event)
-        lines = [*_own_words(entry.event), *formatter.lines(entry.event, state)]
-        if lines:
-            yield entry, "\n".join(lines)
+        if text := formatter.story(entry.event, state):
+            yield entry, text
 
 
 def story_text(entries: Iterable[Entry]) -> str:

@@ -6,6 +6,7 @@ A variable of the environment of the same name takes precedence: ``ROBOTS=24 mak
 import os
 
 SAMPLES: dict[str, dict[str, tuple[int, int]]] = {
+    "adapter": {"FAULTS": (200, 1000)},
     "change_alarm": {"RUNS": (48, 200)},
     "check": {"RUNS": (8, 100)},
     "damaged_lines": {"FRAMES": (5_000, 1_000_000)},
@@ -22,6 +23,7 @@ SAMPLES: dict[str, dict[str, tuple[int, int]]] = {
     "mutations": {"MUTATIONS": (60, 10_000)},
     "paper_study": {"DRAWS": (20, 20)},
     "peers": {"ROBOTS": (2, 6)},
+    "plc": {"FAULTY": (60, 1000), "MOVES": (40, 200)},
     "public_geometries": {"ROBOTS": (8, 100)},
     "quick_level": {"ROBOTS": (12, 100)},
     "recalibration": {"MACHINES": (4, 100)},

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from drivers.simulated.robot import SimulatedMachine
-from hexacell import services
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.cli.app import main
 from hexacell.runs.archive import INDEX
+from hexacell.services import search_effort
 from procedures.journal.journal import read_journal
 from procedures.steps import events
 from tests.cli.cell_folder import PATIENT, QUICK, SHORT, CellFolder, copy_cell
@@ -78,13 +78,13 @@ def typed_here(
 @pytest.fixture
 def one_robot(monkeypatch: pytest.MonkeyPatch) -> None:
     """Predict on a single robot and from few poses: the output is under test, not its quality."""
-    monkeypatch.setattr(services, "EFFORT", replace(services.EFFORT, dry_run_robots=1))
+    monkeypatch.setattr(search_effort, "EFFORT", replace(search_effort.EFFORT, dry_run_robots=1))
 
 
 @pytest.fixture
 def few_candidates(monkeypatch: pytest.MonkeyPatch) -> None:
     """Choose among few poses in this process, and check the plan on few; neither is under test."""
-    monkeypatch.setattr(services, "EFFORT", FEW_CHOICES)
+    monkeypatch.setattr(search_effort, "EFFORT", FEW_CHOICES)
 
 
 @pytest.fixture

@@ -3,13 +3,13 @@
 import sys
 from unittest.mock import AsyncMock
 
-from hexacell import services
 from hexacell.__main__ import main
 from hexacell.design.search_effort import SearchEffort
+from hexacell.services import search_effort
 from hexacell.services.write_back import proposals
 
 if __name__ == "__main__":
-    services.EFFORT = SearchEffort(
+    search_effort.EFFORT = SearchEffort(
         candidates=64,
         held_out_candidates=128,
         checked_candidates=8,

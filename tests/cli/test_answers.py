@@ -23,7 +23,7 @@ OF_RING = {"joints": "-700 700", "points": "0 0 400 60"}
 """What no cell that comes along proposes."""
 OPTIONS = {
     "adapter": ['options.command = ["python3", "my-adapter.py"]'],
-    "opcua": ['options.endpoint = "opc.tcp://10.0.0.5:4840"'],
+    "opcua": ['options.endpoint = "opc.tcp://10.0.0.5:4840"', 'options.node = "ns=3;s=robot.{name}"'],
     "talker": ['options.address = "room 5"', "options.rate = 7", 'options.nodes = { done = "n1" }'],
     "chooser": ['options.there = "room 6"'],
 }
@@ -79,12 +79,13 @@ def plugins(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Monkey
 
 def answered(draft: CellDraft, **changed: str) -> str:
     """The template with these answers, of which the options of a controller are those above."""
-    proposed = {**TomlDocument.parse(template(draft)).data}
+    of_template = dict(TomlDocument.parse(template(draft)).data)
+    told = {"gauges": of_template.pop("gauges")}
     lines = [
-        f"gauges.{axis} = {{ {', '.join(f'{k} = {v!r}' for k, v in gauge.items())} }}"
-        for axis, gauge in proposed.pop("gauges").items()
+        f"{name} = {given!r}" for name, given in {**of_template, **changed}.items() if name != "options"
     ]
-    lines += [f"{name} = {given!r}" for name, given in (proposed | changed).items() if name != "options"]
+    for axis, gauge in told["gauges"].items():
+        lines += [f"gauges.{axis}.{key} = {given!r}" for key, given in gauge.items()]
     return "\n".join([*lines, *OPTIONS.get(changed.get("controller", ""), ())])
 
 

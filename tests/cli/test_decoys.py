@@ -76,4 +76,4 @@ def test_no_other_place_starts_an_interpreter():
         if isinstance(node, ast.Attribute) and ast.unparse(node) == "sys.executable"
     }
     # Beside the mechanism, only where programs installed with this one are looked for.
-    assert found == {"hexacell/python_process.py", "drivers/controllers/linuxcnc/startup.py"}
+    assert found == {"hexacell/python_process.py", "drivers/controllers/reload_command.py"}

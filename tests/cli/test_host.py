@@ -14,7 +14,7 @@ import pytest
 
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.errors import CellBusy, ExitCode
-from hexacell.run_process.client import HostConnection, HostNotStarted, connect_to_run, start_host
+from hexacell.run_process.client import HostConnection, RunFailed, connect_to_run, start_host
 from hexacell.run_process.host import STOPPED
 from hexacell.run_process.messages import EventRecorded, HostMessage, StatusChanged
 from hexacell.run_process.run_socket import socket_path
@@ -165,7 +165,7 @@ async def _carry_on(cell: Cell, before: tuple[events.Event, ...]) -> None:
 
 async def test_a_host_that_cannot_begin_says_why(cell, run) -> None:
     cell.path.write_text("nothing")
-    with pytest.raises(HostNotStarted, match=str(cell.path)) as refusal:
+    with pytest.raises(RunFailed, match=str(cell.path)) as refusal:
         await start_host(socket_path(cell), arguments(cell, run))
     assert refusal.value.exit_code is ExitCode.USAGE
     await until(lambda: not hosts_of(cell))

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexacell import services
 from hexacell.design.search_effort import SearchEffort
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.services import search_effort
 from tests.geometries import hexaglide_geometry
 
 HEADER = ["point", "orientation", *"xyzabc", *(f"q{leg}" for leg in range(1, 7)), "dx", "dy", "dz"]
@@ -104,7 +104,7 @@ def stranger(cell_folder: Any, tmp_path: Path) -> Stranger:
 @pytest.fixture(autouse=True)
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """Choose among few poses in this process; the quality of the choice is not under test."""
-    monkeypatch.setattr(services, "EFFORT", SearchEffort(candidates=128))
+    monkeypatch.setattr(search_effort, "EFFORT", SearchEffort(candidates=128))
 
 
 def test_a_campaign_by_next_ends_with_all_points_measured(typed_here, short_cell, stranger):

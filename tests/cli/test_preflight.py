@@ -135,7 +135,7 @@ def test_an_unknown_plugin_is_reported_with_the_nearest(typed_here, cell_folder)
     for old, new, words, nearest in (
         ('protocol = "sylvac"', 'protocol = "sylvak"', "gauge protocol 'sylvak'", "'sylvac'?"),
         ('protocol = "cia406"', 'protocol = "cia408"', "encoder protocol 'cia408'", "'cia406'?"),
-        ('= "linuxcncrsh"', '= "linuxcnc"', "controller protocol 'linuxcnc'", "'linuxcncrsh'?"),
+        ('= "linuxcncrsh"', '= "linuxcncrs"', "controller protocol 'linuxcncrs'", "'linuxcncrsh'?"),
         ('config_format = "toml"', 'config_format = "tom"', "config format 'tom'", "'toml'?"),
         ('mechanism = "hexaglide"', 'mechanism = "hexaglid"', "'hexaglid'", "'hexaglide'?"),
     ):

@@ -26,9 +26,9 @@ import hexacell.cli.commands.run
 import hexacell.cli.commands.serve
 from drivers.simulated import cell as simulated_cell
 from drivers.simulated import robot
-from hexacell import services
 from hexacell.cli.app import main
 from hexacell.plugins import Group, load
+from hexacell.services import search_effort
 from procedures.journal import journal
 from tests.faults.interception import Failing, intercepted
 from tests.faults.steps import pull_out
@@ -88,7 +88,7 @@ def serve() -> None:
         (Group.CONFIG_FORMATS, "toml"),
     ):
         load(group, name)
-    services.EFFORT = FEW_CHOICES
+    search_effort.EFFORT = FEW_CHOICES
     robot.LINE_STEPS = 8
     scipy.stats.qmc.Sobol(3).random(2)  # which reads a file that not everybody may read
     print("ready", flush=True)

@@ -20,21 +20,23 @@ from hexacell.cli.commands import cell
 from hexacell.errors import DeviceError, ExitCode, UsageError
 from hexacell.plugins import Group, PluginFailed
 from hexacell.study.tasks import results_of
+from tests.cli.cell_folder import copy_cell
 
 Install = Callable[..., None]
+UNATTENDED = ("--unattended", "--mode", "optimise")
 
 
 @pytest.fixture
 def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Install:
-    """Put a package on the path that announces ``gauges``; ``body`` is its module's source."""
+    """Put a package on the path that announces ``plugins``; ``body`` is its module's source."""
     monkeypatch.syspath_prepend(tmp_path)
 
-    def put(package: str, gauges: str, body: str) -> None:
+    def put(package: str, plugins: str, body: str, group: Group = Group.GAUGES) -> None:
         (tmp_path / f"{package}.py").write_text(body)
         info = tmp_path / f"{package}-1.0.dist-info"
         info.mkdir()
         (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
-        (info / "entry_points.txt").write_text(f"[{Group.GAUGES.entry_points}]\n{gauges}\n")
+        (info / "entry_points.txt").write_text(f"[{group.entry_points}]\n{plugins}\n")
         monkeypatch.delitem(sys.modules, package, raising=False)
 
     return put
@@ -68,9 +70,10 @@ def test_an_unknown_name_is_refused_with_the_nearest() -> None:
 )
 def test_a_broken_plugin_is_named_when_asked_for(install: Install, body: str, reason: str) -> None:
     install("laser_c", "laser = laser_c:Laser", body)
-    with pytest.raises(UsageError, match=reason) as caught:
+    with pytest.raises(PluginFailed, match=reason) as caught:
         plugins.load(Group.GAUGES, "laser")
-    assert "laser_c:Laser" in str(caught.value)
+    assert caught.value.exit_code is ExitCode.HARDWARE
+    assert str(caught.value).startswith("laser_c 1.0: ")
     assert str(caught.value).endswith("Repair or uninstall laser_c")
 
 
@@ -173,3 +176,68 @@ def test_a_task_of_a_study_is_named_where_it_is_carried_out(laser) -> None:
         list(results_of([()], laser("sound")._parsed, lambda: pool))
     failed = PluginFailed("failed", subject="laser_k 1.0", action="Report it")
     assert str(pickle.loads(pickle.dumps(failed))) == str(failed)
+
+
+DRIVER = """
+from hexacell.cell.fields import key
+from hexacell.cell.robot import ControllerOptions
+
+class BoxOptions(ControllerOptions):
+    slot: int = key(..., "its place in the rack")
+
+class Box:
+    Options = BoxOptions
+
+    def __init__(self, settings, *, trace=None):
+        self._slot = settings.options.slot
+
+    async def open(self):
+        return {}["no such robot"]
+"""
+
+
+@pytest.fixture
+def box(install: Install, tmp_path: Path) -> Callable[[str], str]:
+    """A cell whose controller is of a package."""
+    cell = copy_cell(tmp_path)
+    cell.edit(('"linuxcncrsh"', '"box"\noptions = { slot = 3 }'))
+
+    def of(body: str) -> str:
+        install("box_a", "box = box_a:Box", body, Group.CONTROLLERS)
+        return str(cell.cell)
+
+    return of
+
+
+@pytest.mark.parametrize(
+    ("body", "reason"),
+    [
+        ("import no_such_module", "No module named 'no_such_module'"),
+        ("class Box:\n    Options = dict", "its Options are no hexacell.cell.robot.ControllerOptions"),
+    ],
+)
+def test_a_controller_that_cannot_be_loaded_is_named_with_its_version(box, capsys, body, reason) -> None:
+    assert app.main(["cell", "show", box(body)]) == ExitCode.HARDWARE
+    said = " ".join(capsys.readouterr().err.split())
+    assert "box_a 1.0: controller protocol 'box' cannot be loaded" in said
+    assert reason in said
+
+
+@pytest.mark.parametrize(
+    ("methods", "reason"),
+    [
+        (
+            "stop reload close",
+            "controller protocol 'box' cannot be loaded from box_a:Box: Box has no 'async def move'",
+        ),
+        ("move stop reload close", "this plug-in failed in box_a.Box.open: KeyError"),
+    ],
+)
+def test_a_controller_that_is_not_whole_or_fails_is_named_with_its_version(
+    box, capsys, methods, reason
+) -> None:
+    body = DRIVER + "".join(
+        f"\n    async def {one}(self, *_): ..." for one in f"prepare position status {methods}".split()
+    )
+    assert app.main(["run", box(body), *UNATTENDED]) == ExitCode.HARDWARE
+    assert f"box_a 1.0: {reason}" in " ".join(capsys.readouterr().err.split())

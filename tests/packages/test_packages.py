@@ -1,4 +1,4 @@
-"""Packages beside hexacell add a gauge, encoders, a mechanism: their own suites pass, cells use them."""
+"""Packages beside hexacell add what it has not: their own suites pass, and cells use them."""
 
 import json
 import os
@@ -44,7 +44,12 @@ def python(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("package", "with_it"), [("counter_gauge", ()), ("scale_box", ("hexacell_scale_box_twin.py",))]
+    ("package", "with_it"),
+    [
+        ("counter_gauge", ()),
+        ("scale_box", ("hexacell_scale_box_twin.py",)),
+        ("hexapod_box", ("hexacell_hexapod_box_twin.py",)),
+    ],
 )
 def test_its_own_suite_passes(package, with_it, installed, tmp_path):
     """Run as its makers would, against what is installed."""
@@ -62,6 +67,17 @@ def test_its_own_suite_passes(package, with_it, installed, tmp_path):
 def test_encoders_are_found_by_the_name_of_their_protocol(installed: Callable[[str], Path]) -> None:
     loaded = "from hexacell.plugins import Group, load; print(load(Group.ENCODERS, 'scale-box').__module__)"
     assert python("-c", loaded, path=installed("scale_box")).stdout.split() == ["hexacell_scale_box"]
+
+
+@pytest.mark.slow
+def test_a_cell_has_the_options_of_a_controller(installed, tmp_path):
+    cell = copy_cell(tmp_path)
+    cell.edit(('"linuxcncrsh"', '"hexapod-box"\noptions = { robot = "left" }'))
+    shown = python("-m", "hexacell", "cell", "show", cell.cell, path=installed("hexapod_box"))
+    assert shown.returncode == 0, shown.stderr
+    assert re.search(r'(?m)^robot = "left"  # line \d+\nanswer_s = 2\.0  # default$', shown.stdout)
+    refused = python("-m", "hexacell", "cell", "show", cell.cell, path=None)
+    assert (refused.returncode, "hexapod-box" in refused.stderr) == (2, True)
 
 
 @pytest.fixture

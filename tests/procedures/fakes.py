@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from drivers import interfaces
-from drivers.controllers.linuxcnc.protocol import parse_pose_refusal
+from drivers.controllers.linuxcnc.gcode import parse_pose_refusal
 from drivers.errors import GaugeAtEnd, PoseRefused, StartupNotPermitted
 from drivers.simulated.linuxcnc.state import MotionRefused
 from drivers.simulated.robot import SimulatedMachine

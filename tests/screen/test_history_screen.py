@@ -12,7 +12,7 @@ from textual.pilot import Pilot
 from hexacell.cell.loader import Cell
 from hexacell.config.versions import ConfigEditedSince
 from hexacell.errors import FileError, UsageError
-from hexacell.run_process.messages import LiveSnapshot
+from hexacell.run_process.live_snapshot import LiveSnapshot
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.model import ScreenModel
 from hexacell.screen.overlays import ConfirmOverlay

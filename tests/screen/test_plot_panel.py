@@ -37,12 +37,13 @@ def view(*points: tuple[float, float]) -> PlotView:
 async def test_a_note_stands_until_there_is_something_to_draw_within_both_axes() -> None:
     app = OnePlot()
     async with app.run_test(size=(60, 20)) as pilot:
-        panel, plot = app.query_one(PlotPanel), app.query_one(PlotWidget)
-        await until(lambda: plot.is_mounted)
+        panel = app.query_one(PlotPanel)
         panel.show(view())
-        assert not plot.display
+        assert not panel.query(PlotWidget)
         panel.show(view((1.0, 30.0), (7.0, 0.05)))
+        await until(lambda: bool(panel.border_subtitle))
         await pilot.pause()
+        plot = app.query_one(PlotWidget)
         assert plot.display
         assert panel.border_subtitle == "o so far   ┄ limit   → records"
         assert plot._x_min < 1.0

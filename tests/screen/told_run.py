@@ -11,15 +11,13 @@ from hexacell.cell.loader import Cell
 from hexacell.dry_run.campaign import VisitedPose
 from hexacell.results.run_comparison import ParameterTrend
 from hexacell.run_process.client import RunConnection
+from hexacell.run_process.live_snapshot import GaugeSnapshot, LiveSnapshot, Shown
 from hexacell.run_process.messages import (
     ControlChanged,
     EventRecorded,
-    GaugeSnapshot,
     HostMessage,
-    LiveSnapshot,
     QuestionChanged,
     RunDescribed,
-    Shown,
     StatusChanged,
 )
 from hexacell.runs.run_folder import RunFolder

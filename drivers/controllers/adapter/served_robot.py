@@ -11,7 +11,8 @@ import queue
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, Protocol, TextIO
 
 VERSION = 1
@@ -34,8 +35,8 @@ class Robot(Protocol):
     What is returned is the answer's ``done``; a failure is a :class:`FailedError`.
     """
 
-    def hello(self, settings: Told) -> Told:
-        """Connect, by the settings of the cell file; its name and description. Nothing moves."""
+    def hello(self, told: Told) -> Told:
+        """Connect, by ``settings``, ``host`` and ``port`` of the cell file; its name. Nothing moves."""
 
     def status(self) -> Told:
         """``estop``, ``enabled``, ``homed``, ``remote``, ``moving``, ``errors``, ``heartbeat``."""
@@ -53,13 +54,13 @@ class Robot(Protocol):
         """Stop the motion in place, at once; returns at rest."""
 
 
-def serve(robot: Robot, lines: TextIO = sys.stdin, answers: TextIO = sys.stdout) -> None:
+def serve(robot: Robot, lines: Iterable[str] = sys.stdin, answers: TextIO = sys.stdout) -> None:
     """Answer each line of requests until they end; then the robot is stopped."""
     _Service(robot, lines, answers).run()
 
 
 class _Service:
-    def __init__(self, robot: Robot, lines: TextIO, answers: TextIO) -> None:
+    def __init__(self, robot: Robot, lines: Iterable[str], answers: TextIO) -> None:
         self._robot, self._lines, self._answers = robot, lines, answers
         self._writing = threading.Lock()
         self._orders: queue.SimpleQueue[Told | None] = queue.SimpleQueue()
@@ -97,7 +98,7 @@ class _Service:
         if do == "hello":
             if request["version"] != VERSION:
                 raise FailedError("refused", f"this program has version {VERSION} of the protocol")
-            return {"version": VERSION, "length": "mm", "angle": "deg", **robot.hello(request["settings"])}
+            return {"version": VERSION, "length": "mm", "angle": "deg", **robot.hello(request)}
         if do in {"status", "position", "stop"}:
             answer: Told | None = getattr(robot, do)()
             return answer
@@ -110,5 +111,5 @@ class _Service:
         return None
 
     def _send(self, request: Told, **answer: Any) -> None:  # noqa: ANN401 - what JSON can hold
-        with self._writing:
+        with self._writing, suppress(OSError):  # where nobody listens any more, the requests end too
             print(json.dumps({"id": request["id"], **answer}), file=self._answers, flush=True)

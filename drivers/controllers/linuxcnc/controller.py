@@ -6,9 +6,11 @@ from contextlib import contextmanager, suppress
 from pathlib import PurePath
 
 from drivers import errors, interfaces
-from drivers.controllers.linuxcnc import protocol, startup
+from drivers.controllers.linuxcnc import gcode, protocol, startup
 from drivers.controllers.linuxcnc.commands import ControllerCommands
 from drivers.controllers.linuxcnc.session import Session
+from drivers.controllers.poses import agree, require_unmoved
+from drivers.controllers.reload_command import run_reload_command
 from drivers.wire_trace import TraceRecorder
 from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError
@@ -38,7 +40,7 @@ class LinuxcncrshController:
         self._session = Session(settings, timeouts, trace)
         self._order = asyncio.Lock()
         self._joints_before_reload: tuple[float, ...] | None = None
-        self._restoring = protocol.restoring_block("")
+        self._restoring = gcode.restoring_block("")
         self._has_changed_modes = False
         self._is_unready = False
 
@@ -84,7 +86,7 @@ class LinuxcncrshController:
                 await self._make_ready(commands, permitted, stops)
                 if self._has_changed_modes:
                     await self._restore_modes(commands)
-                self._restoring = protocol.restoring_block(await startup.check_coordinate_system(commands))
+                self._restoring = gcode.restoring_block(await startup.check_coordinate_system(commands))
 
     async def move(self, pose: Pose, duration_s: float) -> None:
         """Move to ``pose`` in inverse time; returns when the actual pose agrees with it.
@@ -100,7 +102,7 @@ class LinuxcncrshController:
         """
         stops = self._session.stop_count
         try:
-            block = protocol.timed_move(pose, duration_s)
+            block = gcode.timed_move(pose.as_tuple(), duration_s)
         except ValueError as error:
             raise errors.MoveRefused(f"to move to {pose}", str(error), subject=self._name) from error
         limit_s = 2.0 * duration_s + self._timeouts.beyond_move
@@ -161,7 +163,7 @@ class LinuxcncrshController:
                     self._joints_before_reload = await commands.joints()
                 await startup.switch_machine(commands, self._timeouts, on=False)
                 if command := self._settings.reload_command:
-                    await startup.run_reload_command(command, self._name, self._timeouts.reload)
+                    await run_reload_command(command, self._name, self._timeouts.reload)
                 await self._make_ready(await self._session.reconnect(), permitted, stops)
 
     async def close(self) -> None:
@@ -199,7 +201,12 @@ class LinuxcncrshController:
         if self._joints_before_reload is not None:
             # With other zeros it reports other joints where it stands: encoders then show whether it moved.
             if not self._settings.joints_include_zeros:
-                self._require_unmoved(self._joints_before_reload, await commands.joints())
+                require_unmoved(
+                    self._joints_before_reload,
+                    await commands.joints(),
+                    self._settings.position_tolerance_mm,
+                    self._name,
+                )
             self._joints_before_reload = None
         await startup.enter_mdi_mode(commands, self._timeouts)
 
@@ -242,7 +249,7 @@ class LinuxcncrshController:
 
     def _move_refusal(self, pose: Pose, reason: str, action: str | None) -> errors.MoveRefused:
         move = f"to move to {pose}"
-        if (found := protocol.parse_pose_refusal(reason)) is None:
+        if (found := gcode.parse_pose_refusal(reason)) is None:
             return errors.MoveRefused(move, reason, subject=self._name, action=action)
         axis, is_highest = found
         return errors.PoseRefused(move, reason, subject=self._name, axis=axis, is_highest=is_highest)
@@ -256,13 +263,13 @@ class LinuxcncrshController:
         """Wait until it is there; on a computer under load the move is acknowledged before its end."""
         here, still_s = None, protocol.loop_time()
         last_s = still_s + limit_s
-        while not self._agree(there := await commands.pose(), target):
-            if here is None or not self._agree(there, here):
+        while not agree(there := await commands.pose(), target, self._settings):
+            if here is None or not agree(there, here, self._settings):
                 here, still_s = there, protocol.loop_time()
             was_stopped = self._was_stopped_since(stops)
             if was_stopped or protocol.loop_time() > min(still_s + self._timeouts.arrival, last_s):
                 reason = "it was stopped on request" if was_stopped else await commands.reason()
-                if not was_stopped and protocol.parse_pose_refusal(reason):  # acknowledged all the same
+                if not was_stopped and gcode.parse_pose_refusal(reason):  # acknowledged all the same
                     raise self._move_refusal(target, reason, None)
                 raise errors.MotionInterrupted(
                     f"stopped at {there} before reaching {target}: {reason}",
@@ -271,20 +278,5 @@ class LinuxcncrshController:
                 )
             await asyncio.sleep(self._timeouts.poll)
 
-    def _agree(self, one: Pose, other: Pose) -> bool:
-        position, angle = protocol.pose_difference(one, other)
-        settings = self._settings
-        return position <= settings.position_tolerance_mm and angle <= settings.angle_tolerance_deg
-
     def _was_stopped_since(self, stops: int) -> bool:
         return self._session.stop_count != stops
-
-    def _require_unmoved(self, before: tuple[float, ...], after: tuple[float, ...]) -> None:
-        moved = [abs(new - old) for new, old in zip(after, before, strict=True)]
-        if max(moved) > self._settings.position_tolerance_mm:
-            joint = moved.index(max(moved)) + 1
-            raise DeviceError(
-                f"moved joint {joint} by {max(moved):.3f} mm while it read its config again",
-                subject=self._name,
-                action="Check the machine and its config before it moves again",
-            )

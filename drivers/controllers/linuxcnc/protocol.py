@@ -9,27 +9,17 @@ adds a blank line after some refusals; 2.10 ends all with CR LF and explains a r
 
 import asyncio
 import math
-import re
 from dataclasses import dataclass
 
 from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import UsageError
 from hexacell.kinematics.parameters import LEGS
-from hexacell.kinematics.pose import Pose
 
 MAX_LINE_BYTES = 255
 """Longest command with its line end; a longer one overruns the buffer of LinuxCNC 2.9."""
 
 _EXPLANATION = "error:"
 _RESPONSE_NAME = {"SET_WAIT": "WAIT_MODE"}
-_DECIMALS = 8
-_AXIS_LIMIT = re.compile(
-    r"would exceed (?P<axis>[XYZABC])'s (?P<side>positive|negative) limit", re.IGNORECASE
-)
-_UNREACHABLE = re.compile(
-    r"would exceed (?:joint \d+'s|limits)|fails kinematicsInverse|gave non-finite joint location",
-    re.IGNORECASE,
-)
 
 
 def subject_of(settings: ControllerSettings) -> str:
@@ -112,39 +102,6 @@ def encode_command(command: str, subject: str) -> bytes:
     return line
 
 
-def timed_move(pose: Pose, duration_s: float) -> str:
-    """The block that moves to ``pose`` in inverse time: F is 1 / duration, in 1/min.
-
-    In millimetres (G21), and in machine coordinates (G53): no query shows that the coordinate system is
-    rotated (G10 L2 R). It has more decimals than the six of reported positions. A feed rate (G94) would
-    count X, Y and Z only (LinuxCNC, G-code reference, G93 and G94), and a rapid move (G0) goes as fast as
-    it can.
-
-    Raises:
-        ValueError: A coordinate is not a finite number.
-    """
-    if not all(math.isfinite(value) for value in pose.as_tuple()):
-        raise ValueError("a coordinate is not a finite number")
-    words = zip("XYZABC", pose.as_tuple(), strict=True)
-    coordinates = " ".join(f"{axis}{value:.{_DECIMALS}f}" for axis, value in words)
-    return f"G21 G53 G93 G1 {coordinates} F{60.0 / duration_s:.{_DECIMALS}f}"
-
-
-def restoring_block(codes: str) -> str:
-    """The block that restores what :func:`timed_move` changes, from the words after ``PROGRAM_CODES``.
-
-    That are inches, the motion, the feed mode, and the feed, which a change of its mode sets to zero. A G1
-    that has no feed is refused, and other motions need more words: instead, no motion is active (G80).
-    """
-    words = codes.upper().split()
-    mode = next((word for word in words if word in ("G93", "G94", "G95")), "G94")
-    feed = next((word for word in words if word.startswith("F")), "F0")
-    has_feed = mode != "G93" and float(feed[1:]) != 0.0
-    motion = "G0" if not words or "G0" in words else "G1" if "G1" in words and has_feed else "G80"
-    units = ("G20",) if "G20" in words else ()
-    return " ".join((*units, mode, motion, *((feed,) if has_feed else ())))
-
-
 def parse_explanation(line: str) -> str:
     """The explanation in one of 2.10's ``error: ...`` lines, empty for any other line."""
     return line[len(_EXPLANATION) :].strip() if line.lower().startswith(_EXPLANATION) else ""
@@ -181,30 +138,9 @@ def parse_positions(text: str) -> tuple[float, float, float, float, float, float
     return x, y, z, a, b, c
 
 
-def parse_pose_refusal(reason: str) -> tuple[str | None, bool] | None:
-    """Why a pose is refused; None if the messages say that something else prevents the move.
-
-    It is the axis beyond whose limit it is, one of ``xyzabc`` or None for another reason, and whether that
-    limit is its highest value.
-
-    The messages are those of LinuxCNC's motion module (``command.c``): ``would exceed C's positive limit``,
-    ``would exceed joint 3's negative limit``, ``fails kinematicsInverse``.
-    """
-    if found := _AXIS_LIMIT.search(reason):
-        return found["axis"].lower(), found["side"].lower() == "positive"
-    return (None, True) if _UNREACHABLE.search(reason) else None
-
-
 def parse_number(text: str) -> float:
     """The first number of an answer; not finite where there is none."""
     try:
         return float(text.split(maxsplit=1)[0])
     except (IndexError, ValueError):
         return math.nan
-
-
-def pose_difference(one: Pose, other: Pose) -> tuple[float, float]:
-    """The largest difference of a position, mm, and of an angle, deg, less full turns."""
-    differences = [a - b for a, b in zip(one.as_tuple(), other.as_tuple(), strict=True)]
-    angles = [math.remainder(difference, 360.0) for difference in differences[3:]]
-    return max(map(abs, differences[:3])), max(map(abs, angles))

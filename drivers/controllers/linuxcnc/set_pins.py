@@ -21,9 +21,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from hexacell.config.interface import NumberToken, token_error
+from hexacell.config.interface import NUMBER, NumberToken, token_error
 from hexacell.config.linuxcnc_hal import HalText
-from hexacell.config.linuxcnc_ini import IniText
+from hexacell.config.linuxcnc_ini import INCLUDE, IniText
 from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.printable import printable
 from hexacell.storage.atomic_files import read_text
@@ -36,6 +36,13 @@ FAILURE_PINS = "*fwd-kins-fail"
 
 _VARIABLE = re.compile(r"\[([^\]]+)\](?:([\w.-]+)|\(([^)]+)\))", re.ASCII)
 _PUT_TOGETHER = re.compile(r"[\[$\"']")
+_VALUE = re.compile(rf"{NUMBER}|0[xX][\da-fA-F]+|(?i:true|false)", re.ASCII)
+
+_LINKS = frozenset({"net", "linksp", "linkps"})
+_OF_HALCMD = re.compile(
+    "[sg]etp|[sg]ets|[ps]type|newsig|delsig|net|link(?:pp|ps|sp)|unlinkp|addf|delf|start|stop|(?:un)?load.*|"
+    "waitusr|source|(?:un)?alias|(?:un)?lock|(?:un)?echo|show|list|save|status|print|debug|help|quit|exit"
+)
 
 _SHOWN = re.compile(r"\s*\S+\s+(?:float|bit|[su](?:32|64))\s+\S+\s+(?P<value>\S+)\s+(?P<pin>\S+)")
 
@@ -66,7 +73,7 @@ def set_pins(files: Sequence[Path], settle_s: float = KINEMATICS_CYCLES_S) -> in
     if not hal:
         raise UsageError("no HAL file is named", action="hexacell-set-pins FILE.hal ... [FILE.ini ...]")
     inis = [path for path in files if path not in hal]
-    wanted = _wanted(hal, [IniText(read_text(path), path, "") for path in inis])
+    wanted = _wanted(hal, [_with_includes_named(path, inis) for path in inis])
     if not wanted:
         raise UsageError(
             "the HAL files set no pin to a number, or to a variable of these INI files",
@@ -97,6 +104,17 @@ def set_pins(files: Sequence[Path], settle_s: float = KINEMATICS_CYCLES_S) -> in
     return len(wanted)
 
 
+def _with_includes_named(path: Path, inis: Sequence[Path]) -> IniText:
+    """An INI file; raises ``FileError`` where it includes another one that is not named."""
+    text = read_text(path)
+    for found in INCLUDE.finditer(text):
+        if Path(found[1]).name not in {ini.name for ini in inis}:
+            line = text.count("\n", 0, found.start()) + 1
+            action = "Name it too: it may have the numbers"
+            raise FileError(f"{found[1]} is included here", subject=path, line=line, action=action)
+    return IniText(text, path, "")
+
+
 def _wanted(hal: Sequence[Path], inis: Sequence[IniText]) -> Mapping[str, str]:
     """Every pin with its value as text; of INI variables, those of sections that the INI files have.
 
@@ -123,29 +141,52 @@ def _filled(
     """What a pin is to get, None if that is not part of the geometry; ``used`` gets the INI files of it."""
     number, own = value.text, list(_of_files(value, inis))
     for variable, ini in own:
-        number = number.replace(variable[0], ini.number(f"{variable[1]}/{variable[2] or variable[3]}").text)
+        token = ini.number(f"{variable[1]}/{variable[2] or variable[3]}")
+        if not _VALUE.fullmatch(token.text):
+            problem, action = (
+                f"{variable[0]} is {token.text!r}, which is no number",
+                "Write one, in this line",
+            )
+            raise token_error(token, problem, ini.source, action)
+        number = number.replace(variable[0], token.text)
         used.add(ini.source)
     is_wanted = bool(own) if inis else _VARIABLE.search(number) is None
-    if (is_wanted and _PUT_TOGETHER.search(number)) or "[" in _VARIABLE.sub("", number):
+    if _PUT_TOGETHER.search(_VARIABLE.sub("", number)) or (is_wanted and not _VALUE.fullmatch(number)):
         problem = f"{value.text} is no number and no variable that these INI files have"
         raise token_error(value, problem, source, "Write it as [SECTION]NAME, [SECTION](NAME) or a number")
     return number if is_wanted else None
 
 
 def _of_files(word: NumberToken, inis: Sequence[IniText]) -> Iterator[tuple[re.Match[str], IniText]]:
-    """The variables in a word of which an INI file has the section, each with the first such file."""
+    """The variables in a word of which an INI file has the section, each with that file."""
     for found in _VARIABLE.finditer(word.text):
-        yield from [(found, ini) for ini in inis if ini.has_section(found[1])][:1]
+        having = [ini for ini in inis if ini.has_section(found[1])]
+        if len(having) > 1:
+            problem = f"it has a section [{found[1]}], as {having[0].source} has"
+            raise FileError(problem, subject=having[1].source, action="Have it in one of them")
+        yield from [(found, ini) for ini in having]
 
 
 def _require_no_other_way(text: HalText, hal: Sequence[Path], inis: Sequence[IniText]) -> None:
     """Raise ``FileError`` where numbers reach LinuxCNC by more than the files' ``setp`` lines."""
+    parts = {pin.partition(".")[0] for pin, _ in text.pins}
+    # Without INI files the numbers in the HAL file are the geometry, those of signals at its pins too.
+    signals = {
+        word.text
+        for command, *words in text.commands
+        if command.text in _LINKS and any(word.text.partition(".")[0] in parts for word in words)
+        for word in words
+    }
     for command, *words in text.commands:
         is_named = {path.name for path in hal} & {Path(word.text).name for word in words}
         is_of_signal = any(list(_of_files(word, inis)) for word in words)
+        is_of_signal |= not inis and bool(words) and words[0].text in signals
         if (command.text == "source" and not is_named) or (command.text == "sets" and is_of_signal):
             problem = f"{command.text} {' '.join(word.text for word in words)} may set pins too"
             raise token_error(command, problem, text.source, "Name the file too, or set the pin by setp")
+        if not _OF_HALCMD.fullmatch(command.text) and [word.text for word in words[:1]] != ["="]:
+            problem = f"{command.text!r} is no command of halcmd, and might set a pin"
+            raise token_error(command, problem, text.source, "Write setp PIN VALUE, with blanks between")
 
 
 def _shown(pattern: str) -> Mapping[str, str]:

@@ -5,18 +5,12 @@ An acknowledgement means only that a command arrived: ``set machine on`` in emer
 """
 
 import asyncio
-import os
-import sys
-import tempfile
 from collections.abc import Callable
-from pathlib import Path
 
 from drivers.controllers.linuxcnc.commands import NO_REASON, ControllerCommands
 from drivers.controllers.linuxcnc.protocol import Timeouts, loop_time, parse_number
 from drivers.errors import CommandRefused, MotionInterrupted
 from drivers.interfaces import StartupAction
-from hexacell.errors import DeviceError
-from hexacell.storage.atomic_files import read_end
 
 Stopped = Callable[[], bool]
 
@@ -24,7 +18,6 @@ _MODAL_ACTION = "Put it into RS274NGC_STARTUP_CODE, or send it in MDI"
 _OFFSET_MM = 1e-6
 _UNITS_MM = {"MM": 1.0, "CM": 10.0, "INCH": 25.4}
 _MOST_REQUESTS = 2
-_SHOWN_CHARACTERS = 400
 
 
 async def acknowledge_on_completion(commands: ControllerCommands) -> None:
@@ -190,46 +183,3 @@ async def _becomes(commands: ControllerCommands, what: str, state: str, timeouts
             return False
         await asyncio.sleep(timeouts.poll)
     return True
-
-
-async def run_reload_command(command: tuple[str, ...], subject: str, timeout_s: float) -> None:
-    """Run the command that makes a controller reload its config to its end; kill it on cancellation.
-
-    Programs that were installed together with this one are found wherever it was started from.
-    Its output goes to a file, not to a pipe: a daemon that it starts would hold a pipe open for ever.
-
-    Raises:
-        DeviceError: It cannot be run, fails (the end of its output is shown) or takes too long.
-    """
-
-    def failure(problem: str) -> DeviceError:
-        return DeviceError(
-            f"the reload command '{' '.join(command)}' {problem}",
-            subject=subject,
-            action="Correct controller.reload_command; the machine is off",
-        )
-
-    path = os.pathsep.join((os.environ.get("PATH", os.defpath), str(Path(sys.executable).parent)))
-    with tempfile.TemporaryFile() as output:
-        try:
-            process = await asyncio.create_subprocess_exec(
-                *command,
-                stdin=asyncio.subprocess.DEVNULL,
-                stdout=output,
-                stderr=output,
-                env=os.environ | {"PATH": path},
-            )
-        except OSError as error:
-            raise failure(f"cannot be run: {error.strerror or error}") from error
-        try:
-            async with asyncio.timeout(timeout_s):
-                status = await process.wait()
-        except TimeoutError:
-            raise failure(f"took longer than {timeout_s:g} s") from None
-        finally:
-            if process.returncode is None:
-                process.kill()
-                await process.wait()
-        if status != 0:
-            said = read_end(output, _SHOWN_CHARACTERS)
-            raise failure(f"failed with status {status}" + (f": {said}" if said else ""))

@@ -26,6 +26,18 @@ _CHUNK = 1600
 _POLL_S = 0.05
 
 
+class _Handler(socketserver.BaseRequestHandler):
+    server: "SimulatedController"
+    request: socket.socket
+
+    def handle(self) -> None:
+        client = _Client(self.server, self.request.sendall)
+        with suppress(OSError, ConnectionCut):
+            while data := self.request.recv(_CHUNK):
+                if not self.server.is_silent:
+                    client.receive(data)
+
+
 class SimulatedController(socketserver.ThreadingTCPServer):
     """Serves clients until it is closed, each in a thread of its own, as the real one does.
 
@@ -37,6 +49,7 @@ class SimulatedController(socketserver.ThreadingTCPServer):
     """
 
     daemon_threads = False
+    handler: type[socketserver.BaseRequestHandler] = _Handler
 
     def __init__(self, machine: Machine, settings: ControllerSettings) -> None:
         self.state = ControllerState(machine)
@@ -44,7 +57,7 @@ class SimulatedController(socketserver.ThreadingTCPServer):
         self.is_silent = self._is_unplugged = False
         self.frozen_answers: Mapping[str, str] | None = None
         self._connections: set[socket.socket] = set()
-        super().__init__((HOST, 0), _Handler)
+        super().__init__((HOST, 0), self.handler)
         self.port = self.server_address[1]
         self._thread = threading.Thread(
             target=self.serve_forever, args=(_POLL_S,), name="simulated controller"
@@ -98,18 +111,6 @@ class SimulatedController(socketserver.ThreadingTCPServer):
         for connection in tuple(self._connections):
             with suppress(OSError):
                 connection.shutdown(socket.SHUT_RDWR)
-
-
-class _Handler(socketserver.BaseRequestHandler):
-    server: SimulatedController
-    request: socket.socket
-
-    def handle(self) -> None:
-        client = _Client(self.server, self.request.sendall)
-        with suppress(OSError, ConnectionCut):
-            while data := self.request.recv(_CHUNK):
-                if not self.server.is_silent:
-                    client.receive(data)
 
 
 class _Client:

@@ -166,12 +166,26 @@ class ControllerState:
             return True
         if (duration_s := parsed.duration_s) is not None:
             duration_s *= 100.0 / self.feed_override_percent
-        job = self._start(lambda: self._travel(target, duration_s))
+        job = self.travel(target, duration_s)
         if not self.waits:
             return True
         with suppress(CancelledError):
             return job.result()
         return True  # an aborted motion succeeds, as in LinuxCNC
+
+    def travel(self, target: Pose, duration_s: float | None) -> Future[bool]:
+        """Start to move; whether it was not refused, once it has ended or was stopped."""
+        return self._start(lambda: self._travel(target, duration_s))
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether a motion has begun, or waits, and has not ended."""
+        return any(not job.done() for job in self._jobs)
+
+    @property
+    def stop_count(self) -> int:
+        """How often motion was stopped."""
+        return self._abort_count
 
     def _require_mdi(self) -> None:
         if not self.homed:

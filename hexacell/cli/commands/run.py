@@ -16,7 +16,7 @@ from hexacell.cli.console import Console
 from hexacell.cli.progress import RunProgress, gauges_on_request
 from hexacell.cli.terminal import KeyboardCommands, SignalCommands, TerminalOperator, is_interactive
 from hexacell.errors import ExitCode, HexacellError, UsageError
-from hexacell.run_process.live_devices import RunDeviceWatch
+from hexacell.run_process.run_device_watch import RunDeviceWatch
 from hexacell.runs.run_folder import new_run
 from hexacell.services.history.resumption import run_to_resume
 from hexacell.services.history.run_summary import state_of

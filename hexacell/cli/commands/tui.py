@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import argparse
-import gc
 import os
 import select
 import sys
 import threading
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
 from hexacell.screen.app import TechnicianApp
+from hexacell.screen.first_values import FirstValues
 from hexacell.screen.preferences import preferences_path, read_preferences
 
-if TYPE_CHECKING:
-    from hexacell.screen.model import ScreenModel
+THREADS_YIELD_AFTER_S = 0.0005
+"""How soon a thread that computes lets the screen go on, s: keys are heard while the rest is loaded."""
 
 
 def main(options: argparse.Namespace, console: Console) -> ExitCode:
@@ -41,11 +39,14 @@ def main(options: argparse.Namespace, console: Console) -> ExitCode:
 def page(options: argparse.Namespace, _: Console) -> ExitCode:
     """Show the screen at this terminal, or to the server that has started this process for a browser."""
     end_with_terminal(sys.stdin.fileno())
+    sys.setswitchinterval(THREADS_YIELD_AFTER_S)
     path: Path = options.cell
+    values = FirstValues(path)
     app = TechnicianApp(
-        partial(_model, path),
+        values.model,
         read_preferences(preferences_path()),
         first_cell=None if path.exists() else path,
+        first_values=values,
     )
     app.run()
     if app.return_code:
@@ -53,16 +54,6 @@ def page(options: argparse.Namespace, _: Console) -> ExitCode:
     # Everything is closed; to take all modules apart would last half a second more.
     sys.stdout.flush()
     os._exit(int(ExitCode.DONE))
-
-
-def _model(path: Path) -> ScreenModel:
-    """Loaded behind the first screen: numpy and scipy take a second."""
-    from hexacell.screen.model import ScreenModel  # noqa: PLC0415
-    from hexacell.screen.workplace import Workplace  # noqa: PLC0415
-
-    model = ScreenModel(Workplace(path))
-    gc.freeze()  # what is loaded stays: to look through it for garbage would keep a key waiting for 0.1 s
-    return model
 
 
 def end_with_terminal(terminal: int) -> None:

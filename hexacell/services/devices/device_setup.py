@@ -1,12 +1,14 @@
 """The devices of a cell, real or simulated: the only module that knows which."""
 
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
+from inspect import iscoroutinefunction
 from pathlib import Path
+from typing import Any
 
 from drivers.errors import translated
-from drivers.interfaces import DeviceIdentity
+from drivers.interfaces import Controller, DeviceIdentity, EncoderBank, Gauge, Thermometer
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.stop_input import stop_input_of
 from drivers.wire_trace import WireTrace
@@ -18,7 +20,7 @@ from hexacell.cell.passwords import with_passwords
 from hexacell.clock import CellClock
 from hexacell.config.layout import ConfigLayout, CurrentConfig
 from hexacell.kinematics.mechanism import joint_zeros
-from hexacell.plugins import Group, created
+from hexacell.plugins import Group, broken, created
 from procedures.devices.device_set import Devices, MountedGauge, Thermometers
 from procedures.run.cancellation import shielded
 
@@ -89,7 +91,7 @@ def devices_of(
     gauges = tuple(
         MountedGauge(
             translated(
-                created(Group.GAUGES, gauge.protocol, gauge_with_agreement(gauge, settings.noise), links),
+                _driver(Group.GAUGES, gauge.protocol, gauge_with_agreement(gauge, settings.noise), links),
                 f"gauge {gauge.name}",
             ),
             gauge.mounting,
@@ -97,7 +99,7 @@ def devices_of(
         for gauge in settings.gauges
     )
     controller = translated(
-        created(Group.CONTROLLERS, settings.controller.protocol, settings.controller, trace=trace),
+        _driver(Group.CONTROLLERS, settings.controller.protocol, settings.controller, trace=trace),
         "controller",
     )
     wiring: dict[str, object] = {"trace": trace}
@@ -107,13 +109,33 @@ def devices_of(
             config = CurrentConfig(config_paths(settings, folder or Path()), ConfigLayout.of(settings))
             # By how much joints that include zeros exceed what the encoders show, by the current config.
             wiring["zeros"] = lambda: joint_zeros(settings.mechanism, config.geometry().geometry).tolist()
-    encoders = created(Group.ENCODERS, settings.encoders.protocol, encoders_with_speed(settings), **wiring)
+    encoders = _driver(Group.ENCODERS, settings.encoders.protocol, encoders_with_speed(settings), **wiring)
     return Devices(
         gauges,
         translated(encoders, "encoders"),
         controller,
         stop_input_of(settings.guards, folder or Path()),
     )
+
+
+_INTERFACES: Mapping[Group, type] = {
+    Group.GAUGES: Gauge,
+    Group.ENCODERS: EncoderBank,
+    Group.CONTROLLERS: Controller,
+    Group.THERMOMETERS: Thermometer,
+}
+
+
+def _driver(group: Group, name: str, *arguments: object, **named: object) -> Any:  # noqa: ANN401
+    """What ``created`` makes; raises ``PluginFailed`` too if it lacks a coroutine of its interface."""
+    made, interface = created(group, name, *arguments, **named), _INTERFACES[group]
+    for method in sorted(
+        {one for base in interface.__mro__ for one in vars(base) if not one.startswith("_")}
+    ):
+        is_there = iscoroutinefunction(getattr(made, method, None))
+        if iscoroutinefunction(getattr(interface, method)) and not is_there:
+            raise broken(group, name, f"{type(made).__name__} has no 'async def {method}'")
+    return made
 
 
 def gauge_with_agreement(gauge: GaugeSettings, noise: NoiseSettings) -> GaugeSettings:
@@ -151,7 +173,7 @@ async def open_devices(settings: CellSettings, folder: Path | None = None) -> As
     links = SharedSerialPorts(trace=trace)
     devices = devices_of(settings, links, trace, folder)
     thermometers = Thermometers(
-        [created(Group.THERMOMETERS, one.protocol, one) for one in settings.thermometers]
+        [_driver(Group.THERMOMETERS, one.protocol, one) for one in settings.thermometers]
     )
     try:
         identities = (*await devices.open(), *await thermometers.open())

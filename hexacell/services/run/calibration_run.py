@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from drivers.interfaces import DeviceIdentity
-from hexacell import __version__, services
+from hexacell import __version__
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
 from hexacell.config.layout import ConfigLayout, CurrentConfig, controller_geometry, fingerprint
@@ -16,6 +16,7 @@ from hexacell.errors import FileError, HexacellError, UsageError, flatten_errors
 from hexacell.results.result import AcceptedResult
 from hexacell.robot.model import Robot, robot_of
 from hexacell.runs.run_folder import RunFolder, runs_folder, unused
+from hexacell.services import search_effort
 from hexacell.services.design_facts import require_design
 from hexacell.services.devices.device_setup import Connected, device_addresses, open_devices
 from hexacell.services.history.journal_soundness import require_sound
@@ -273,5 +274,5 @@ def new_calibration(cell: Cell, mode: Mode, *, length_check: bool = False) -> Ca
 def _calibration(
     cell: Cell, robot: Robot, mode: Mode, accepted: AcceptedResult | None, *, length_check: bool
 ) -> Calibration:
-    settings, listed, effort = cell.settings, pose_list_of(cell), services.EFFORT
+    settings, listed, effort = cell.settings, pose_list_of(cell), search_effort.EFFORT
     return Calibration(settings, robot, mode, listed, accepted, length_check=length_check, effort=effort)

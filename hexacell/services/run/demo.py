@@ -1,12 +1,13 @@
 """Simulated cells: served to other processes, and calibrated as a demo in a folder of its own."""
 
 import shutil
+import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from hexacell.cell.bundled import CONTROLLER, bundled_config
-from hexacell.cell.loader import Cell, dump, load_cell
+from hexacell.cell.loader import Cell, checked_cell, dump, load_cell
 from hexacell.cell.passwords import password_path
 from hexacell.errors import FileError, UsageError
 from hexacell.runs.cell_lock import cell_lock, lock_path
@@ -57,14 +58,36 @@ def served_cell(cell: Cell) -> Iterator[str]:
         yield dump(settings.model_copy(update={"controller": controller}))
 
 
+def simulated_cell(
+    name: str = "simulated-hexaglide", folder: Path | str | None = None, *, seed: int | None = None
+) -> Cell:
+    """A bundled cell with simulated devices, on a fast clock, copied into a folder of its own.
+
+    Args:
+        name: as in ``hexacell demo``: ``gough-stewart``, ``linapod``, ``rotary-cranks``, ...
+        folder: empty, new, or that of an earlier copy, which is replaced; by default a new temporary one.
+        seed: of the noise of its devices; by default as bundled.
+
+    Raises:
+        UsageError: there is no such simulated cell.
+        FileError: the folder is neither empty nor an earlier copy's.
+        CellBusy: a run goes on in it.
+    """
+    bundled = require_simulation(load_cell(bundled_config(name)))
+    path = _copy_cell(bundled.path, Path(folder or tempfile.mkdtemp(prefix="hexacell-")))
+    if seed is not None:
+        text = bundled.document.replaced({("simulation", "seed"): str(seed)})
+        write_own(path, checked_cell(path, text).text.encode())
+    return load_cell(path)
+
+
 def prepare_demo(folder: Path, config_name: str) -> RunRequest:
     """Copy a bundled cell into ``folder`` and request a calibration of it.
 
     Raises ``UsageError`` if there is no such simulated cell, ``FileError`` if the folder is neither empty
     nor an earlier demo's, ``CellBusy`` if a demo is running in it.
     """
-    bundled = require_simulation(load_cell(bundled_config(config_name)))
-    cell = load_cell(_copy_cell(bundled.path, folder))
+    cell = simulated_cell(config_name, folder)
     run = RunFolder(runs_folder(cell) / RUN)
     return RunRequest(cell, run, Mode.OPTIMISE, UnattendedOperator(), unattended=True)
 
@@ -74,7 +97,7 @@ def _copy_cell(cell_file: Path, folder: Path) -> Path:
     if folder.is_dir() and any(folder.iterdir()):
         if not (folder / MARKER).is_file() or (folder / MARKER).is_symlink():
             problem = "this folder is not empty, and no earlier demo's"
-            raise FileError(problem, subject=folder, action="Choose another with --folder")
+            raise FileError(problem, subject=folder, action="Choose another folder")
         # The marker is kept so that a removal that fails can be repeated.
         configs = list(folder.glob(f"*{CONTROLLER}"))
         kept = {folder / MARKER, *(folder / lock_path(config).name for config in configs)}

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 from hexacell.cell.model import CellSettings
 from hexacell.errors import ExitCode
-from hexacell.run_process.messages import HostFailed, LiveSnapshot
+from hexacell.run_process.live_snapshot import LiveSnapshot
+from hexacell.run_process.messages import HostFailed
 from hexacell.text.layout import error_with_u
 from hexacell.text.screens.measuring import remaining
 from hexacell.text.screens.questions import question_view

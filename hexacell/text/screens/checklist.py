@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from hexacell.cell.model import CellSettings
 from hexacell.dry_run.campaign import VisitedPose
 from hexacell.errors import HexacellError, flatten_errors
-from hexacell.run_process.messages import LiveSnapshot
+from hexacell.run_process.live_snapshot import LiveSnapshot
 from hexacell.text.screens.views import ChecklistItem, Mark
 
 NOT_CHECKED_YET = (

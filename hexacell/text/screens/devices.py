@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.cell.loader import Cell
-from hexacell.run_process.messages import GaugeSnapshot, LiveSnapshot, Shown
+from hexacell.run_process.live_snapshot import GaugeSnapshot, LiveSnapshot, Shown
 from hexacell.text.screens.views import Card, Line, Urgency
 from procedures.run.keys import ThreeNumbers
 

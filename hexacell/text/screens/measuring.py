@@ -13,7 +13,7 @@ from hexacell.run_process.messages import HostFailed
 from hexacell.text.layout import duration
 from hexacell.text.screens.questions import RECOVERIES
 from hexacell.text.screens.run_picture import RunPicture, Setback
-from hexacell.text.screens.views import Column, FaultView, PlotView, Row, Series, Urgency
+from hexacell.text.screens.views import FaultView, PlotView, Row, Series, Urgency
 from procedures.calibration.calibration import Mode
 from procedures.run.keys import Phase, SetKey
 from procedures.steps import events
@@ -36,14 +36,6 @@ PHASES = {
 
 LETTERS = {Phase.IDENTIFY: "", Phase.BEFORE: "b", Phase.AFTER: "a", Phase.CONFIRM: "c", Phase.LENGTH: "L"}
 """Before the names of records."""
-
-RECORD_COLUMNS = (
-    Column("pose", 8),
-    *(Column(name, 8, is_figure=True) for name in ("x mm", "y mm", "z mm", "off mm")),
-    Column("sigma", 8, is_figure=True),
-)
-"""``off`` is the largest of x, y and z less what the fit says, before it less what was predicted; ``sigma``
-its ratio to the noise."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,18 +7,10 @@ from hexacell.text.history import standing
 from hexacell.text.layout import error_with_u, verdict_word
 from hexacell.text.screens.banner import verdict_urgency
 from hexacell.text.screens.run_picture import MODES
-from hexacell.text.screens.views import Column, PlotView, Row, Series
+from hexacell.text.screens.views import PlotView, Row, Series
 
 NOTHING_ASKED = (
     "v compares the chosen run with the one before it, o shows the drift of each parameter over all runs.",
-)
-
-RUN_COLUMNS = (
-    Column("run", 20),
-    Column("what", 12),
-    Column("verdict", 18),
-    Column("error ± U, mm", 15),
-    Column("controller", 13),
 )
 
 

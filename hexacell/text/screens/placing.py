@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from hexacell.run_process.messages import GaugeSnapshot, LiveSnapshot
+from hexacell.run_process.live_snapshot import GaugeSnapshot, LiveSnapshot
 from hexacell.text.screens.devices import WIDE_BAR, plunger_place, travel_bar
 from hexacell.text.screens.views import Line, Urgency
 

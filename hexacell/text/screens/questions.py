@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from hexacell.kinematics.pose import Pose
-from hexacell.run_process.messages import LiveSnapshot
+from hexacell.run_process.live_snapshot import LiveSnapshot
 from hexacell.text.config_changes import pending_text
 from hexacell.text.screens.views import Beside, Choice, QuestionView, Urgency
 from hexacell.text.terms import found_sentence

@@ -12,7 +12,7 @@ from hexacell.text.screens.banner import verdict_urgency
 from hexacell.text.screens.measuring import SUSPICIOUS_SIGMAS, accuracy_plot, off_of, residuals_of
 from hexacell.text.screens.questions import PERSON, approval_refusal, yes_or_no
 from hexacell.text.screens.run_picture import RunPicture
-from hexacell.text.screens.views import Column, Line, PlotView, QuestionView, Row, Series, Urgency
+from hexacell.text.screens.views import Line, PlotView, QuestionView, Row, Series, Urgency
 from hexacell.text.verdict import VERDICT_MEANINGS, teaching_sentence
 from hexacell.verdict.verification import DeviationStatistics
 from procedures.run.keys import Phase
@@ -20,13 +20,6 @@ from procedures.run.questions import PendingChange, WrittenResult
 from procedures.run.state import RunState
 
 PROPOSAL_WAITS = "Its proposal can still be written: w asks for it, with the change."
-
-PARAMETER_COLUMNS = (
-    Column("parameter", 13),
-    *(Column(name, 11, is_figure=True) for name in ("config now", "new config", "changed by")),
-    Column("sigma", 7, is_figure=True),
-    Column("  meaning", 24),
-)
 
 FRAMES = (
     "The config's numbers are in the frames that move your taught points least. What changed, and its "

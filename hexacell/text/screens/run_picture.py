@@ -7,6 +7,7 @@ from datetime import datetime
 from hexacell.campaign.decisions import Forecast
 from hexacell.errors import ExitCode
 from hexacell.run_process import messages
+from hexacell.run_process.live_snapshot import LiveSnapshot
 from procedures.engine.command_loop import Status
 from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import Question
@@ -40,7 +41,7 @@ class RunPicture:
     state: RunState = field(default_factory=RunState)
     status: Status = Status.IDLE
     question: Question | None = None
-    live: messages.LiveSnapshot | None = None
+    live: LiveSnapshot | None = None
     live_at_s: float = 0.0
     control: messages.ControlChanged | None = None
     cursor: messages.CursorMoved | None = None
@@ -93,7 +94,7 @@ def picture_after(  # noqa: PLR0911 - a case a message
             return replace(picture, status=status)
         case messages.QuestionChanged(question=question):
             return replace(picture, question=question)
-        case messages.LiveSnapshot():
+        case LiveSnapshot():
             return replace(picture, live=message, live_at_s=now_s)
         case messages.ControlChanged():
             return replace(picture, control=message)

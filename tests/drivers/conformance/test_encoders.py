@@ -9,12 +9,16 @@ from tempfile import TemporaryDirectory
 import pytest
 
 from drivers import conformance
+from drivers.controllers.adapter.controller import AdapterController
+from drivers.controllers.adapter.link import Timeouts as AdapterTimeouts
+from drivers.controllers.adapter.options import AdapterOptions
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.encoders.dbc import DbcBank
 from drivers.encoders.modbus import ModbusBank
 from drivers.encoders.of_controller import ControllerScales
 from drivers.interfaces import Controller, DeviceIdentity, EncoderBank, EncoderSample, StartupAction
+from drivers.simulated.adapter import SimulatedAdapter
 from drivers.simulated.linuxcnc.server import SimulatedController
 from drivers.simulated.served_device import setting
 from hexacell.cell.devices import EncoderSettings, LinearEncoderSettings
@@ -187,6 +191,25 @@ class LinuxcncTwin:
                 self._server.is_silent = on
             case _:
                 self._server.state.set_estop(on=on)
+
+
+class AdapterTwin(LinuxcncTwin):
+    """The simulated controller behind the adapter protocol."""
+
+    def __init__(self, server: SimulatedAdapter) -> None:
+        super().__init__(server)
+        options = AdapterOptions(address=f"127.0.0.1:{server.port}")
+        self.settings = ControllerSettings(config="machine.toml", protocol="adapter", options=options)
+
+
+class TestAdapter(conformance.ControllerConformance):
+    def driver(self, settings: ControllerSettings) -> Controller:
+        return AdapterController(settings, timeouts=AdapterTimeouts(connect=0.5, answer=0.5))
+
+    @contextmanager
+    def twin(self) -> Iterator[conformance.ControllerTwin]:
+        with SimulatedAdapter(MachineInTime(), ControllerSettings(config="machine.toml")) as server:
+            yield AdapterTwin(server)
 
 
 class TestLinuxcncrsh(conformance.ControllerConformance):

@@ -27,6 +27,7 @@ from hexacell.errors import DeviceError, FileError, UsageError
 from hexacell.result_server import server
 from hexacell.result_server import server as server_module
 from hexacell.runs.run_folder import runs_folder
+from hexacell.storage.opcua_certificate import ensure_certificate
 from hexacell.verdict.decision import Verdict
 from procedures.run.cancellation import cancel_and_wait
 from tests.hexacell.services.notify.local_servers import closed_port
@@ -262,8 +263,8 @@ async def test_a_password_that_others_can_read_and_a_port_that_is_taken_are_refu
 
 def test_its_certificate_stays_and_its_key_is_its_own(tmp_path) -> None:
     folder = tmp_path / "opcua"
-    first = [path.read_bytes() for path in server.ensure_certificate(folder, "urn:x", "127.0.0.1")]
-    again = [path.read_bytes() for path in server.ensure_certificate(folder, "urn:x", "127.0.0.1")]
+    first = [path.read_bytes() for path in ensure_certificate(folder, "urn:x", "127.0.0.1")]
+    again = [path.read_bytes() for path in ensure_certificate(folder, "urn:x", "127.0.0.1")]
     assert first == again
     assert stat.S_IMODE((folder / "private-key.pem").stat().st_mode) == 0o600
     assert x509.load_der_x509_certificate(first[0]).not_valid_after_utc.year >= 2036

@@ -8,15 +8,14 @@ import pytest
 
 from hexacell.errors import FileError
 from hexacell.run_process.client import LOST, HostConnection, connect_to_run
+from hexacell.run_process.live_snapshot import GaugeSnapshot, LiveSnapshot
 from hexacell.run_process.messages import (
     ClientMessage,
     ControlChanged,
-    GaugeSnapshot,
     GiveCommand,
     HostFailed,
     HostMessage,
     Leave,
-    LiveSnapshot,
     StatusChanged,
     client_message,
     message_line,

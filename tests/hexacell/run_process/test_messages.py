@@ -11,10 +11,12 @@ from pydantic import TypeAdapter, ValidationError
 
 from hexacell.errors import UsageError
 from hexacell.run_process import messages
+from hexacell.run_process.live_snapshot import GaugeSnapshot, LiveSnapshot
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Command, Undo
 from procedures.run.questions import Question
 from procedures.steps import events
+from tests.complete_models import complete
 
 NOON = TypeAdapter(datetime).validate_json('"2026-11-20T12:00:00.123Z"')
 EVENTS: tuple[Any, ...] = get_args(get_args(events.Event)[0])
@@ -32,6 +34,7 @@ SAME_EACH_TIME = settings(
 @st.composite
 def valid(draw: st.DrawFn, kind: type[Any]) -> Any:
     """An instance of a record; hypothesis knows nothing of what its validators refuse."""
+    complete()
     try:
         return draw(st.from_type(kind))
     except ValidationError:
@@ -104,9 +107,7 @@ def test_every_kind_has_a_word_of_its_own() -> None:
         ),
         messages.ControlChanged(is_in_control=True, who="ada"),
         messages.StatusChanged(status=Status.PAUSED),
-        messages.LiveSnapshot(
-            gauges=(messages.GaugeSnapshot(name="x", axis="x", shown_mm=-0.1, travel_mm=12.5),)
-        ),
+        LiveSnapshot(gauges=(GaugeSnapshot(name="x", axis="x", shown_mm=-0.1, travel_mm=12.5),)),
         messages.QuestionChanged(question=None),
         messages.CursorMoved(sequence=1, last=2, at=NOON, speed=0.5),
     ],

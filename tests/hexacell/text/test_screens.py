@@ -14,16 +14,14 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.kinematics.pose import Pose
+from hexacell.run_process.live_snapshot import GaugeSnapshot, LiveSnapshot, Shown
 from hexacell.run_process.messages import (
     ControlChanged,
     EventRecorded,
-    GaugeSnapshot,
     HostFailed,
     HostMessage,
-    LiveSnapshot,
     QuestionChanged,
     RunDescribed,
-    Shown,
     StatusChanged,
 )
 from hexacell.text.screens.banner import cell_banner, preflight_banner, run_banner

@@ -20,6 +20,7 @@ from procedures.steps.move import Move
 from procedures.steps.pilot import Pilot
 from procedures.steps.roll_back import RollBack
 from procedures.steps.sample import Sample
+from tests.complete_models import complete
 from tests.procedures.story import READING, an_identification, located
 from tests.recorded_events import record
 
@@ -221,6 +222,7 @@ def test_keys_are_stable(step: Any, key: str) -> None:
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
 st.register_type_strategy(float, NUMBERS)  # for what is drawn by its annotation
 SIX = st.just(()) | st.tuples(*[st.sampled_from([1, -1, 0])] * 6)
+complete()
 READINGS = st.builds(Reading, **(dict.fromkeys(Reading.model_fields, ...) | {"directions": SIX}))
 st.register_type_strategy(Reading, READINGS)
 GEOMETRY = st.fixed_dictionaries({"S": st.tuples(*[st.tuples(*[NUMBERS] * 3)] * 6)})

@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.controllers.linuxcnc import protocol
+from drivers.controllers import poses
+from drivers.controllers.linuxcnc import gcode, protocol
 from hexacell.errors import UsageError
 from hexacell.kinematics.pose import Pose
 
@@ -39,12 +40,12 @@ def test_an_encoded_command_fits_the_server_and_is_one_line(command):
 
 @given(st.builds(Pose, *[COORDINATES] * 6), st.floats(0.1, 1e5))
 def test_a_timed_move_keeps_pose_and_duration_and_fits_a_line(pose, duration_s):
-    words = protocol.timed_move(pose, duration_s).split()
+    words = gcode.timed_move(pose.as_tuple(), duration_s).split()
     letters, values = zip(*((word[0], float(word[1:])) for word in words), strict=True)
     assert "".join(letters) == "GGGGXYZABCF"
     assert values[4:10] == pytest.approx(pose.as_tuple(), abs=1e-7)
     assert 60.0 / values[10] == pytest.approx(duration_s, rel=1e-4)
-    protocol.encode_command(f"set mdi {protocol.timed_move(pose, duration_s)}", "controller")
+    protocol.encode_command(f"set mdi {gcode.timed_move(pose.as_tuple(), duration_s)}", "controller")
 
 
 @pytest.mark.parametrize(
@@ -61,13 +62,13 @@ def test_a_timed_move_keeps_pose_and_duration_and_fits_a_line(pose, duration_s):
     ],
 )
 def test_the_modes_of_before_are_restored_by_one_block(codes, block):
-    assert protocol.restoring_block(codes) == block
+    assert gcode.restoring_block(codes) == block
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf")])
 def test_a_timed_move_to_a_pose_that_is_not_finite_is_refused(value):
     with pytest.raises(ValueError, match="not a finite number"):
-        protocol.timed_move(Pose(0.0, 0.0, 500.0, 0.0, value, 0.0), 1.0)
+        gcode.timed_move((0.0, 0.0, 500.0, 0.0, value, 0.0), 1.0)
 
 
 @pytest.mark.parametrize(
@@ -119,4 +120,4 @@ def test_positions_are_six_finite_numbers_or_refused(text):
 
 def test_the_pose_difference_ignores_full_turns_and_gives_the_largest_components():
     one, other = Pose(1, 2, 3, 180.0, 0.1, 0), Pose(1, 2.5, 2, -180.0, -0.2, 0)
-    assert protocol.pose_difference(one, other) == pytest.approx((1.0, 0.3))
+    assert poses.pose_difference(one, other) == pytest.approx((1.0, 0.3))

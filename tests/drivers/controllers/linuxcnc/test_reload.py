@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from drivers.controllers.linuxcnc.startup import run_reload_command
+from drivers.controllers.reload_command import run_reload_command
 from drivers.errors import ConnectionLost, StartupNotPermitted
 from drivers.interfaces import StartupAction
 from hexacell.errors import DeviceError

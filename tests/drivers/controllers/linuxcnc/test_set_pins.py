@@ -97,6 +97,13 @@ def test_where_the_forward_kinematics_fails_the_old_numbers_are_set_again(pins, 
         (INI + "[OTHER]\nGAIN = 2\n", UsageError, r"no pin kins\.gain"),
         ("[KINS]\nL1 = 591.0 # mm\n", FileError, "behind L1 stands"),
         ("[KINS]\nL2 = 591.0\n", FileError, r"no L1 in a section \[KINS\]"),
+        ("[KINS]\nL1 = \\\n591.0\nL2 = 582.5\n", FileError, r"\.ini:2: \[KINS\]L1 is '\\\\'"),
+        (
+            "[KINS]\nL1 = 591,0\nL2 = 582.5\n",
+            FileError,
+            r"\.ini:2: \[KINS\]L1 is '591,0', which is no number",
+        ),
+        (INI + "#INCLUDE tuned/more.inc\n", FileError, r"\.ini:4: tuned/more\.inc is included here"),
     ],
 )
 def test_one_number_that_cannot_be_set_leaves_all_as_they_were(pins, files, ini, error, words) -> None:
@@ -113,6 +120,7 @@ def test_one_number_that_cannot_be_set_leaves_all_as_they_were(pins, files, ini,
         "kins.l.1 = [KINS]L2\r",
         "setp kins.l.1 [KINS](L2)e0",
         "# no more \\\n# than a remark\nsetp kins.l.1 [KINS]L2",
+        "\tsetp\tkins.l.1\t[KINS](L2)\t# tabs\nloadusr -W hal_input\nsetp kins.mode TRUE",
     ],
 )
 def test_every_form_in_which_halcmd_takes_a_variable_is_set(pins, files, line) -> None:
@@ -127,6 +135,11 @@ def test_every_form_in_which_halcmd_takes_a_variable_is_set(pins, files, line) -
         ("setp kins.l.1 [KINS]\\\nL2", "does not set one pin to one value"),
         ("# of leg 2 \\\nsetp kins.l.1 [KINS]L2", "the comment before it ends with a backslash"),
         ("setp kins.l.1 [KINS", "no number and no variable"),
+        ("setp kins.l.1 $L2", "no number and no variable"),
+        ('setp kins.l.1 "582.5"', "no number and no variable"),
+        ("setp kins.l.1 [KINS]L2[OTHER]GAIN", "no number and no variable"),
+        ("kins.l.1=[KINS]L2", "'kins.l.1=.KINS.L2' is no command of halcmd"),
+        ("SETP kins.l.1 [KINS]L2", "'SETP' is no command of halcmd"),
         ("setp kins.l.1 [KINS]L2$SUFFIX", "no number and no variable"),
         ("setp kins.l.1 [KINS]L2\nsetp kins.l.1 5", "set a second time"),
         ("setp kins.l.1 5\nkins.l.1 = [KINS](L2)", "set a second time"),
@@ -139,6 +152,29 @@ def test_a_line_that_may_set_a_pin_otherwise_is_named_and_nothing_is_set(pins, f
         set_pins(files(hal=f"setp kins.l.0 [KINS]L1\n{line}\n"))
     assert caught.value.line in {2, 3}
     assert pins()["kins.l.0"] == "590"
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("setp kins.l.1 582,5", "no number and no variable"),
+        ("setp kins.l.1 nan", "no number and no variable"),
+        ("net second => kins.l.1\nsets second 582.5", "sets second 582.5 may set pins too"),
+        ("linkps kins.l.1 second\nsets second 582.5", "sets second 582.5 may set pins too"),
+    ],
+)
+def test_without_an_ini_file_every_number_counts(pins, files, line, words) -> None:
+    with pytest.raises(FileError, match=words) as caught:
+        set_pins(files(hal=f"net limits => joint.0.in\nsets limits 1\nsetp kins.l.0 585.5\n{line}\n")[:1])
+    assert caught.value.line in {4, 5}
+    assert pins()["kins.l.0"] == "590"
+
+
+def test_a_section_that_two_files_have_is_named(pins, files, tmp_path) -> None:
+    """LinuxCNC, which has one file that includes the other, looks into the first of them alone."""
+    (tmp_path / "more.ini").write_text("[KINS]\nL2 = 5.0\n")
+    with pytest.raises(FileError, match=r"more\.ini: it has a section \[KINS\], as .*kins\.ini has"):
+        set_pins([*files(), tmp_path / "more.ini"])
 
 
 def test_a_file_of_which_no_pin_gets_a_number_is_named(pins, files, tmp_path) -> None:

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.controllers.linuxcnc.protocol import restoring_block, timed_move
+from drivers.controllers.linuxcnc.gcode import restoring_block, timed_move
 from drivers.simulated.linuxcnc.mdi import BlockError, ModalState, parse_block
 from hexacell.kinematics.pose import Pose
 
@@ -13,7 +13,7 @@ HERE = Pose(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 
 @pytest.mark.parametrize("modes", [ModalState(), ModalState(1, 94, 250.0), ModalState(80, 93)])
 def test_the_driver_restores_the_modes_of_before(modes):
-    moved = parse_block(timed_move(HERE, 1.0), HERE, modes)
+    moved = parse_block(timed_move(HERE.as_tuple(), 1.0), HERE, modes)
     assert moved.modes == ModalState(1, 93, 0.0)
     assert parse_block(restoring_block(modes.codes), HERE, moved.modes).modes == modes
 

@@ -1,0 +1,1 @@
+"""LinuxCNC by its own Python module, on the computer that it runs on."""

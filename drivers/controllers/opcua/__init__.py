@@ -1,0 +1,1 @@
+"""A controller that is a PLC: a client of its OPC UA server (docs/controller-opcua.md)."""

@@ -24,7 +24,7 @@ ALLOWED = {
     "hexacell/api/test_run.py": "computes meanwhile as a notebook does",
     "linuxcnc/conftest.py": "how long LinuxCNC may take before it is started again",
     "linuxcnc/test_module.py": "compares how long moves take",
-    "packages/hexapod_box/hexacell_hexapod_box.py": "is a driver, which waits for no answer longer than it may",
+    "packages/hexapod_box/hexacell_hexapod_box.py": "is a driver, with limits of waiting",
     "packages/hexapod_box/hexacell_hexapod_box_twin.py": "is a robot, whose moves take time",
     "packages/scale_box/hexacell_scale_box.py": "is a driver, which waits for no answer longer than it may",
     "procedures/journal/test_journal.py": "compares a moment with those in a journal",

@@ -96,6 +96,7 @@ class TechnicianApp(App[int]):
         self.keys_in_use = {str(one.id): one.key_display or one.key for one in KEYS} | self.preferences.keys
         self._load, self._first_cell, self._first_values = load, first_cell, first_values
         self.model: ScreenModel | None = None
+        self._is_loaded = asyncio.Event()
         self._shown_at = 0.0
         self._question_seen, self._fault_seen, self._runs_seen, self._refusals_seen = 0, 0, 0, 0
         super().__init__()
@@ -139,6 +140,7 @@ class TechnicianApp(App[int]):
                 if self._first_values is not None:
                     await self._show_first(self._first_values)
                 self.model = await asyncio.to_thread(self._load)
+            self._is_loaded.set()
             gc.freeze()  # what is loaded stays: to look through it for garbage would keep keys waiting
             self.draw()
             self.set_interval(AGES_EVERY_S, self.draw)
@@ -295,11 +297,13 @@ class TechnicianApp(App[int]):
 
     def action_perform(self, action: str, argument: str = "") -> None:
         """Ask for something."""
-        if self.model is not None:
-            self._start(self._confirmed(self.model, ScreenAction(action), argument))
+        self._start(self._confirmed(ScreenAction(action), argument))
 
-    async def _confirmed(self, model: ScreenModel, action: ScreenAction, argument: str) -> str:
-        """Do something, once a person has confirmed it where that is needed."""
+    async def _confirmed(self, action: ScreenAction, argument: str) -> str:
+        """Do something once all is loaded, and a person has confirmed it where that is needed."""
+        await self._is_loaded.wait()
+        assert self.model is not None  # noqa: S101 - it is loaded
+        model = self.model
         may = model.allows(action, argument)
         question = await model.confirmation(action, argument) if may else None
         if question is not None:

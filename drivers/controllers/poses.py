@@ -6,6 +6,9 @@ from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
 
+_ASIDE_MM, _ASIDE_SHARE = 5.0, 0.05
+"""How much longer than a straight move the way over a pose on it may be, also as a share of it."""
+
 
 def pose_difference(one: Pose, other: Pose) -> tuple[float, float]:
     """The largest difference of a position, mm, and of an angle, deg, less full turns."""
@@ -21,6 +24,16 @@ def agree(one: Pose, other: Pose, settings: ControllerSettings, tolerances: floa
         position <= tolerances * settings.position_tolerance_mm
         and angle <= tolerances * settings.angle_tolerance_deg
     )
+
+
+def aside(start: Pose, at: Pose, target: Pose) -> str | None:
+    """What is wrong with a pose on the way of a straight move, if anything is."""
+    begin, here, end = (one.as_tuple()[:3] for one in (start, at, target))
+    length = math.dist(begin, end)
+    over = math.dist(begin, here) + math.dist(here, end)
+    if over - length <= _ASIDE_MM + _ASIDE_SHARE * length:
+        return None
+    return f"says that it is at {at}, which is not on the way from {start} to {target}"
 
 
 def require_unmoved(

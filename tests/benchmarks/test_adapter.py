@@ -16,7 +16,7 @@ from hexacell.cell.robot import ControllerSettings
 from hexacell.kinematics.pose import Pose
 from tests.benchmarks.figures import NEVER, Figures, at_most
 from tests.benchmarks.samples import sample
-from tests.drivers.conformance.test_encoders import MachineInTime
+from tests.drivers.conformance.test_controllers import MachineInTime
 from tests.drivers.controllers.adapter.faulty import EVERY, driver, whole_job
 from tests.drivers.controllers.adapter.test_conformance import EXAMPLES, settings_of
 

@@ -10,7 +10,8 @@ from drivers import errors, interfaces
 from drivers.controllers.adapter.link import Link, Timeouts
 from drivers.controllers.adapter.messages import Failed, Nothing, Position, Status, pose_of
 from drivers.controllers.adapter.options import AdapterOptions, Program
-from drivers.controllers.poses import agree, require_unmoved
+from drivers.controllers.adapter.session import Session
+from drivers.controllers.poses import agree, aside, require_unmoved
 from drivers.controllers.reload_command import run_reload_command
 from drivers.interfaces import StartupAction
 from drivers.wire_trace import TraceRecorder
@@ -32,9 +33,6 @@ _REQUESTS = {
 _LEFT_TOLERANCES = 10.0
 """A robot that nobody commands may move by so many tolerances of an arrival before the next move."""
 
-_ASIDE_MM, _ASIDE_SHARE = 5.0, 0.05
-"""How much longer than a straight move the way over a pose on it may be, also as a share of it."""
-
 
 class AdapterController:
     """``drivers.interfaces.Controller`` by a program that is trusted in nothing.
@@ -53,17 +51,13 @@ class AdapterController:
         trace: TraceRecorder | None = None,
         timeouts: Timeouts = _TIMEOUTS,
     ) -> None:
-        self._program = program or cast("AdapterOptions", settings.options).program
-        self._name = self._program.name
+        program = program or cast("AdapterOptions", settings.options).program
+        self._name = program.name
         if settings.unit_mm != 1.0:
             raise UsageError("the adapter counts in mm", action="Remove controller.unit_mm")
-        self._settings, self._timeouts, self._trace = settings, timeouts, trace
-        port = settings.port
-        self._told: dict[str, object] = {"host": settings.host, **({} if port is None else {"port": port})}
-        self._is_open = False
-        self._link: Link | None = None
-        self._identity: interfaces.DeviceIdentity | None = None
-        self._linking, self._order, self._stopping = asyncio.Lock(), asyncio.Lock(), asyncio.Lock()
+        self._settings, self._timeouts = settings, timeouts
+        self._session = Session(program, settings, timeouts, trace, self._lose)
+        self._order, self._stopping = asyncio.Lock(), asyncio.Lock()
         self._stop_count = 0
         self._unready = "it was not prepared"
         self._was_enabled = self._is_reloading = self._is_unstopped = False
@@ -77,14 +71,7 @@ class AdapterController:
             DeviceError: it is not there, ends, does not answer, or not as the protocol has it.
         """
         async with self._order:
-            was_open, self._is_open = self._is_open, True
-            try:
-                await self._linked(self._timeouts.connect)
-            except BaseException:
-                self._is_open = was_open
-                raise
-            assert self._identity is not None  # noqa: S101 - of the link
-            return self._identity
+            return await self._session.open()
 
     async def prepare(self, permitted: interfaces.StartupActions) -> None:
         """Leave emergency stop, switch on, home, as far as it is permitted. May move the robot.
@@ -97,7 +84,7 @@ class AdapterController:
         stops = self._stop_count
         async with self._order:
             self._unready = "its last preparation failed"
-            await self._make_ready(await self._linked(self._timeouts.connect), permitted, stops)
+            await self._make_ready(await self._session.linked(self._timeouts.connect), permitted, stops)
 
     async def move(self, pose: Pose, duration_s: float) -> None:
         """Move to ``pose`` in no less than ``duration_s``; returns when the robot rests there.
@@ -112,7 +99,7 @@ class AdapterController:
         """
         stops = self._stop_count
         async with self._order:
-            link = self._connected()
+            link = self._session.connected()
             if self._unready or self._is_unstopped:
                 raise self._refused(pose, self._unready or "it could not be stopped", "Prepare it again")
             if self._stop_count != stops:
@@ -125,18 +112,18 @@ class AdapterController:
 
     async def position(self) -> interfaces.ReportedPosition | None:
         """Pose and joints, also during ``move``; None where it does not know them."""
-        found = await self._position(self._connected())
+        found = await self._position(self._session.connected())
         if found.pose is None:
             return None
         return interfaces.ReportedPosition(pose_of(found.pose), _joints(found))
 
     async def joints_now(self) -> tuple[float, ...] | None:
         """The six joints, also during ``move``; None where it does not know them."""
-        return _joints(await self._position(self._connected()))
+        return _joints(await self._position(self._session.connected()))
 
     async def status(self) -> interfaces.ControllerStatus:
         """Emergency stop, enabled, and what is wrong if it cannot move; also during ``move``."""
-        status = await self._status(self._connected())
+        status = await self._status(self._session.connected())
         may_move = status.enabled and not status.estop
         told = () if may_move else tuple(status.errors)
         if not status.remote:
@@ -157,11 +144,10 @@ class AdapterController:
         async with self._stopping:
             try:
                 try:
-                    await self._stop_over(self._connected())
+                    await self._stop_over(self._session.connected())
                 except (errors.ConnectionLost, errors.CommandRefused) as error:
-                    if self._link is not None:
-                        self._link.fail(error.problem)  # perhaps its own connection to the robot is lost
-                    await self._stop_over(await self._linked(self._timeouts.stop))
+                    self._session.fail(error.problem)  # perhaps its own connection to the robot is lost
+                    await self._stop_over(await self._session.linked(self._timeouts.stop))
             except DeviceError as error:
                 self._is_unstopped = True
                 problem = f"could not be stopped: it {error.problem}"
@@ -176,7 +162,7 @@ class AdapterController:
         """
         stops = self._stop_count
         async with self._order:
-            link = self._connected()
+            link = self._session.connected()
             self._unready = "its last reload failed"
             status = await self._status(link)
             if status.enabled and not status.estop:
@@ -185,68 +171,19 @@ class AdapterController:
                 self._is_reloading = True
             if command := self._settings.reload_command:
                 await run_reload_command(command, self._name, self._timeouts.reload)
-                link.fail("was started anew")
                 self._was_enabled = False  # it may be in the emergency stop that it starts in
-                link = await self._reconnected()
+                link = await self._session.relinked()
             else:
                 await self._do(link, "reload", self._timeouts.reload)
             await self._make_ready(link, permitted, stops)
 
     async def close(self) -> None:
         """End the program, or the connection to it; closing twice is harmless."""
-        self._is_open, self._identity = False, None
-        link, self._link = self._link, None
-        if link is not None:
-            await link.close()
+        await self._session.close()
 
-    async def _linked(self, hello_s: float) -> Link:
-        """The link; another one in place of one that broke, after which it must be prepared."""
-        async with self._linking:
-            self._require_open()
-            if self._link is None or self._link.is_broken:
-                if self._link is not None:
-                    await self._link.close()
-                self._unready = self._unready or "its connection was lost"
-                self._link = await Link.open(
-                    self._program, self._timeouts, self._trace, hello_s, **self._told
-                )
-                said = self._link.hello
-                identity = interfaces.DeviceIdentity(
-                    name=self._name,
-                    protocol=self._program.protocol,
-                    description=", ".join(filter(None, (said.name, said.description))),
-                    serial_number=said.serial_number,
-                )
-                if not self._is_open or identity != (self._identity or identity):
-                    self._link.fail(f"is another one now: {identity.description}")
-                    self._require_open()
-                self._identity = self._identity or identity
-            self._link.require_sound()
-            return self._link
-
-    async def _reconnected(self) -> Link:
-        """The link, as soon as a controller that may be restarting can be reached."""
-        deadline = _now() + self._timeouts.reconnect
-        while True:
-            try:
-                return await self._linked(self._timeouts.connect)
-            except errors.ConnectionLost:
-                if _now() > deadline:
-                    raise
-                await asyncio.sleep(self._timeouts.poll)
-
-    def _connected(self) -> Link:
-        """The link as it is; raises what broke it."""
-        self._require_open()
-        if self._link is None:
-            action = "Prepare it again"
-            raise errors.ConnectionLost("is not connected any more", subject=self._name, action=action)
-        self._link.require_sound()
-        return self._link
-
-    def _require_open(self) -> None:
-        if not self._is_open:
-            raise DeviceError("is not connected", subject=self._name, action="Open it first")
+    def _lose(self) -> None:
+        """There is to be another link."""
+        self._unready = self._unready or "its connection was lost"
 
     async def _status(self, link: Link) -> Status:
         status = self._done(await link.ask("status", Status), "status")
@@ -347,7 +284,7 @@ class AdapterController:
                 Nothing,
                 limit_s,
                 {"pose": list(pose.as_tuple()), "duration_s": duration_s},
-                lambda at: _aside(start, at, pose),
+                lambda at: aside(start, at, pose),
             )
         except TimeoutError:
             await self.stop()
@@ -398,7 +335,7 @@ class AdapterController:
             )
         was_stopped = self._stop_count != stops and failed.kind == "interrupted"
         await self.stop()
-        there = (await self._position(self._connected())).pose
+        there = (await self._position(self._session.connected())).pose
         where = "" if there is None else f" at {pose_of(there)}"
         if was_stopped:
             self._unready = ""
@@ -443,17 +380,6 @@ class AdapterController:
 
     def _refused(self, pose: Pose, reason: str, action: str | None = None) -> errors.MoveRefused:
         return errors.MoveRefused(f"to move to {pose}", reason, subject=self._name, action=action)
-
-
-def _aside(start: Pose, at: Pose, target: Pose) -> str | None:
-    """What is wrong with a pose on the way, if anything is."""
-    length = math.dist(start.as_tuple()[:3], target.as_tuple()[:3])
-    over = math.dist(start.as_tuple()[:3], at.as_tuple()[:3]) + math.dist(
-        at.as_tuple()[:3], target.as_tuple()[:3]
-    )
-    if over - length <= _ASIDE_MM + _ASIDE_SHARE * length:
-        return None
-    return f"says that it is at {at}, which is not on the way from {start} to {target}"
 
 
 def _joints(found: Position) -> tuple[float, ...] | None:

@@ -8,35 +8,25 @@ import asyncio
 import json
 import logging
 import os
-import signal
-from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, Generic, Self, TypeVar
 
-from pydantic import SecretStr, ValidationError
+from pydantic import ValidationError
 
-from drivers.controllers.adapter.messages import (
-    LONGEST_LINE,
-    VERSION,
-    Answer,
-    Failed,
-    Hello,
-    Message,
-    pose_of,
-)
+from drivers.controllers.adapter.masking import Masking, revealed
+from drivers.controllers.adapter.messages import LONGEST_LINE, Answer, Failed, Hello, Message, pose_of
 from drivers.controllers.adapter.options import Program
-from drivers.controllers.reload_command import path_with_own_programs
+from drivers.controllers.adapter.program_process import ProgramProcess
+from drivers.controllers.adapter.served_robot import VERSION
 from drivers.errors import ConnectionLost, ResponseTimeout
 from drivers.wire_trace import LineRecord, TraceRecorder, TrafficDirection
 from hexacell.cell.fields import first_mistake
 from hexacell.clock import Patience
 from hexacell.errors import DeviceError, UsageError
 from hexacell.kinematics.pose import Pose
-from hexacell.printable import printable
-from hexacell.storage.toml_document import MASK, is_secret
 
 AnswerT = TypeVar("AnswerT", bound=Message)
 
@@ -46,9 +36,6 @@ _AT_ANY_TIME = frozenset({"hello", "status", "position", "stop"})
 _SLICE_S = 0.05
 _CHUNK = 65_536
 _SHOWN = 400
-_LAST_LINES = 3
-_MOST_LOGGED = 1000
-"""Lines of a program's stderr that are in the log; a program may print without end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,15 +79,13 @@ class Link:
     def __init__(self, program: Program, timeouts: Timeouts, recorder: TraceRecorder | None) -> None:
         self._program, self._timeouts = program, timeouts
         self._wire = LineRecord(program.name, recorder)
-        self._secrets = [text for text in _secrets(program.settings) if text]
+        self._masked = Masking(program.settings)
         self.order: Request[Any] | None = None
         self._pending: dict[int, Request[Any]] = {}
         self._asked = 0
         self._error: ConnectionLost | None = None
-        self._said: deque[str] = deque(maxlen=_LAST_LINES)
-        self._lines_said = 0
-        self._process: asyncio.subprocess.Process | None = None
-        self._tasks: list[asyncio.Task[None]] = []
+        self._process: ProgramProcess | None = None
+        self._reading: asyncio.Task[None] | None = None
 
     @classmethod
     async def open(
@@ -197,21 +182,12 @@ class Link:
         """End it; a program that does not end in time is killed. Closing twice is harmless."""
         self.fail("was closed")
         if self._process is not None:
-            try:
-                async with asyncio.timeout(self._timeouts.closing):
-                    await self._process.wait()
-            except TimeoutError:
-                _log.warning("%s: did not end with its stdin, and was killed", self._program.name)
-                with suppress(ProcessLookupError):
-                    os.killpg(self._process.pid, signal.SIGKILL)
-                with suppress(TimeoutError):  # what it has started elsewhere may hold its pipes open
-                    async with asyncio.timeout(self._timeouts.closing):
-                        await self._process.wait()
+            await self._process.close(self._timeouts.closing)
         else:
             self._writer.transport.abort()
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        if self._reading is not None:
+            self._reading.cancel()
+            await asyncio.gather(self._reading, return_exceptions=True)
 
     async def _begin(self) -> None:
         program = self._program
@@ -222,7 +198,8 @@ class Link:
                         *program.address, limit=LONGEST_LINE
                     )
             else:
-                await self._start(program.command)
+                self._process = await ProgramProcess.start(program, self._masked, LONGEST_LINE)
+                self._reader, self._writer = self._process.stdout, self._process.stdin
         except OSError as error:  # of which TimeoutError is one
             number = error.errno or 0  # negative from getaddrinfo, which has its own text
             reason = os.strerror(number) if number > 0 else error.strerror or "no answer"
@@ -233,26 +210,10 @@ class Link:
             problem = f"'{program.command[0]}' cannot be started: {reason}"
             action = "Correct controller.options.command"
             raise DeviceError(problem, subject=program.name, action=action) from error
-        self._tasks.append(asyncio.create_task(self._read()))
-
-    async def _start(self, command: tuple[str, ...]) -> None:
-        """Start the program, which a Ctrl+C in this terminal must not end while the robot moves."""
-        pipe = asyncio.subprocess.PIPE
-        process = await asyncio.create_subprocess_exec(
-            *command,
-            stdin=pipe,
-            stdout=pipe,
-            stderr=pipe,
-            limit=LONGEST_LINE,
-            start_new_session=True,
-            env=os.environ | {"PATH": path_with_own_programs()},
-        )
-        assert process.stdin and process.stdout and process.stderr  # noqa: S101, PT018 - pipes
-        self._process, self._reader, self._writer = process, process.stdout, process.stdin
-        self._tasks.append(asyncio.create_task(self._read_stderr(process.stderr)))
+        self._reading = asyncio.create_task(self._read())
 
     async def _greet(self, timeout_s: float, told: Mapping[str, object]) -> None:
-        settings = _revealed(self._program.settings)
+        settings = revealed(self._program.settings)
         hello = await self.ask(
             "hello", Hello, timeout_s, {"version": VERSION, **told, "settings": settings}
         )
@@ -323,46 +284,14 @@ class Link:
         return None
 
     async def _end(self) -> str:
-        """How it ended, in words, with the last lines that it printed."""
-        if self._process is None:
-            return "closed the connection: it was ended or restarted, or serves somebody else"
-        with suppress(TimeoutError):
-            async with asyncio.timeout(1.0):
-                await self._process.wait()
-                await asyncio.wait(self._tasks[:1])
-        status = self._process.returncode
-        how = "closed its output" if status is None else f"ended with exit status {status}"
-        if status is not None and status < 0:
-            how = f"was ended by signal {-status}"
-        return ": ".join((how, *self._said))
-
-    async def _read_stderr(self, stream: asyncio.StreamReader) -> None:
-        rest = b""
-        while data := await stream.read(_CHUNK):
-            *lines, rest = (rest + data).split(b"\n")
-            rest = rest[:_SHOWN]
-            for line in lines:
-                self._say(line)
-        self._say(rest)
-
-    def _say(self, line: bytes) -> None:
-        if not (text := self._masked(line[:_SHOWN].decode("utf-8", "replace")).strip()):
-            return
-        self._said.append(printable(text))
-        self._lines_said += 1
-        if self._lines_said <= _MOST_LOGGED:
-            _log.info("%s: %s", self._program.name, self._said[-1])
-        elif self._lines_said == _MOST_LOGGED + 1:
-            _log.warning("%s: prints more, which is not in the log", self._program.name)
+        """How it ended, in words."""
+        if self._process is not None:
+            return await self._process.ending()
+        return "closed the connection: it was ended or restarted, or serves somebody else"
 
     def _record(self, direction: TrafficDirection, data: bytes) -> None:
         if self._wire.is_on:
             self._wire.add(direction, self._masked(data.decode("utf-8", "replace")).encode())
-
-    def _masked(self, text: str) -> str:
-        for secret in self._secrets:
-            text = text.replace(json.dumps(secret, ensure_ascii=False)[1:-1], MASK).replace(secret, MASK)
-        return text
 
 
 async def _answered(request: Request[Any], timeout_s: float) -> bool:
@@ -378,24 +307,3 @@ async def _answered(request: Request[Any], timeout_s: float) -> bool:
 
 def _shown(line: bytes) -> str:
     return repr(line[:_SHOWN].decode("utf-8", "replace").strip())
-
-
-def _revealed(value: Any) -> Any:  # noqa: ANN401 - what TOML can hold
-    """Settings as they are sent."""
-    if isinstance(value, SecretStr):
-        return value.get_secret_value()
-    if isinstance(value, Mapping):
-        return {name: _revealed(one) for name, one in value.items()}
-    return [_revealed(one) for one in value] if isinstance(value, list | tuple) else value
-
-
-def _secrets(value: Any, *, is_one: bool = False) -> list[str]:  # noqa: ANN401
-    """Every secret in settings, as text."""
-    if isinstance(value, Mapping):
-        several = (_secrets(one, is_one=is_one or is_secret((name,))) for name, one in value.items())
-        return [text for some in several for text in some]
-    if isinstance(value, list | tuple):
-        return [text for one in value for text in _secrets(one, is_one=is_one)]
-    if isinstance(value, SecretStr):
-        return [value.get_secret_value()]
-    return [str(value)] if is_one else []

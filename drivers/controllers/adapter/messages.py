@@ -8,7 +8,6 @@ from hexacell.cell.fields import LONGEST_TEXT, InRange
 from hexacell.kinematics.pose import Pose
 from hexacell.printable import printable
 
-VERSION = 1
 LONGEST_LINE = 65_536
 """Longest message, bytes."""
 MOST_ERRORS = 10

@@ -46,9 +46,9 @@ class AdapterOptions(ControllerOptions):
     @classmethod
     def _has_a_port(cls, address: str | None) -> str | None:
         if address is not None:
-            host, _, port = address.rpartition(":")
+            host, port = _host_and_port(address)
             accepted(host, require_host)
-            if not (port.isdecimal() and 0 < int(port) <= 65535):
+            if not 0 < port <= 65535:
                 raise broken_rule(f"{address} has no port", 'Write host:port, as "10.0.0.5:6001"')
         return address
 
@@ -72,5 +72,11 @@ class AdapterOptions(ControllerOptions):
         if self.address is None:
             name = next((one for one in reversed(self.command) if not one.startswith("-")), "")
             return Program(f"controller {Path(name).name}", self.command, settings=self.settings)
-        host, _, port = self.address.rpartition(":")
-        return Program(f"controller {self.address}", address=(host, int(port)), settings=self.settings)
+        place = _host_and_port(self.address)
+        return Program(f"controller {self.address}", address=place, settings=self.settings)
+
+
+def _host_and_port(address: str) -> tuple[str, int]:
+    """Both parts of ``host:port``; 0 where there is no port."""
+    host, _, port = address.rpartition(":")
+    return host, int(port) if port.isdecimal() else 0

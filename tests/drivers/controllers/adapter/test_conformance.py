@@ -18,7 +18,7 @@ from drivers.simulated.linuxcnc.server import SimulatedController
 from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
-from tests.drivers.conformance.test_encoders import LinuxcncTwin, MachineInTime
+from tests.drivers.conformance.test_controllers import LinuxcncTwin, MachineInTime
 
 EXAMPLES = Path(__file__).parents[4] / "configs" / "controller-adapter"
 HASTY = Timeouts(connect=20.0, answer=4.0, closing=0.5)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from hexacell.cell.loader import Cell
     from hexacell.screen.device_watcher import DeviceWatcher
     from hexacell.screen.model import ScreenModel
     from hexacell.text.screens.views import Card
@@ -19,6 +20,7 @@ class FirstValues:
 
     def __init__(self, path: Path) -> None:
         self._path = path
+        self._cell: Cell | None = None
         self._devices: DeviceWatcher | None = None
 
     def load(self, on_change: Callable[[], None]) -> None:
@@ -33,9 +35,8 @@ class FirstValues:
         from hexacell.run_process.live_devices import watch_devices  # noqa: PLC0415
         from hexacell.screen.device_watcher import DeviceWatcher  # noqa: PLC0415
 
-        self._devices = DeviceWatcher(
-            partial(watch_devices, load_cell(self._path)), time.monotonic, on_change
-        )
+        self._cell = load_cell(self._path)
+        self._devices = DeviceWatcher(partial(watch_devices, self._cell), time.monotonic, on_change)
 
     def start(self) -> None:
         """Watch the devices from now on."""
@@ -59,8 +60,9 @@ class FirstValues:
         return device_cards(self._devices.live, time.monotonic() - self._devices.live_at_s)
 
     def model(self) -> ScreenModel:
-        """The model of the screens, which watches the devices from now on."""
+        """The model of the screens of the loaded cell, which watches the devices from now on."""
         from hexacell.screen.model import ScreenModel  # noqa: PLC0415 - see above
         from hexacell.screen.workplace import Workplace  # noqa: PLC0415 - see above
 
-        return ScreenModel(Workplace(self._path), devices=self._devices)
+        assert self._cell is not None  # noqa: S101 - it is loaded first
+        return ScreenModel(Workplace(self._cell), devices=self._devices)

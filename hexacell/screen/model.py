@@ -13,9 +13,9 @@ from hexacell.run_process.recorded import RecordedRun
 from hexacell.screen.device_watcher import DeviceWatcher
 from hexacell.screen.preferences import RESUME, WITH_LENGTH, ScreenAction
 from hexacell.screen.readiness import Readiness
+from hexacell.screen.run_follower import RunFollower
 from hexacell.screen.run_history import RunHistory
 from hexacell.screen.shown_devices import ShownDevices
-from hexacell.screen.watching import RunFollower
 from hexacell.screen.workplace import Workplace
 from hexacell.services.history.run_index import PastRun
 from hexacell.text.screens import banner, reviewing

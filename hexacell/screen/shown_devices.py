@@ -5,7 +5,7 @@ from collections.abc import Callable
 from hexacell.cell.model import CellSettings
 from hexacell.run_process.live_snapshot import LiveSnapshot
 from hexacell.screen.device_watcher import DeviceWatcher
-from hexacell.screen.watching import RunFollower
+from hexacell.screen.run_follower import RunFollower
 from hexacell.text.screens import devices
 from hexacell.text.screens.placing import Placing, placing
 from hexacell.text.screens.views import Line, Urgency

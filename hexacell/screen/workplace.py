@@ -2,9 +2,8 @@
 
 import asyncio
 from collections.abc import AsyncIterator
-from pathlib import Path
 
-from hexacell.cell.loader import Cell, load_cell
+from hexacell.cell.loader import Cell
 from hexacell.cell.passwords import password_warnings
 from hexacell.config.pending_write import settle_config
 from hexacell.dry_run.campaign import VisitedPose
@@ -36,19 +35,18 @@ def mode_of(what: str) -> Mode:
 
 
 class Workplace:
-    """The cell at a path: its devices, its run and its history. All methods raise ``HexacellError``.
+    """A cell: its devices, its run and its history. All methods raise ``HexacellError``.
 
     Attributes:
         cell: the cell as its file states it now.
         warnings: what a person should change in it.
 
     Raises:
-        FileError: its file cannot be read, or has one mistake.
-        SeveralErrors: it has more than one.
+        FileError: a write of its config was interrupted, and cannot be settled.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.cell: Cell = load_cell(path)
+    def __init__(self, cell: Cell) -> None:
+        self.cell = cell
         settled = settle_config(*self.cell.config_paths)
         self.warnings = (
             *password_warnings(self.cell),

@@ -35,7 +35,7 @@ def path(tmp_path: Path) -> Path:
 
 @asynccontextmanager
 async def opened_assistant(path: Path) -> AsyncIterator[Pilot[int]]:
-    app = TechnicianApp(lambda: ScreenModel(WithoutDevices(path)), first_cell=path)
+    app = TechnicianApp(lambda: ScreenModel(WithoutDevices(load_cell(path))), first_cell=path)
     async with app.run_test(size=(80, 24)) as pilot:
         await until(lambda: isinstance(app.screen, AssistantScreen))
         await until(lambda: "Question 1 of" in shown(pilot))

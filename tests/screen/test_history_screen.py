@@ -53,7 +53,7 @@ def runs(cell: Cell) -> list[ProposedRun]:
 
 @asynccontextmanager
 async def opened_history(cell: Cell) -> AsyncIterator[Pilot[int]]:
-    app = TechnicianApp(lambda: ScreenModel(WithoutDevices(cell.path)))
+    app = TechnicianApp(lambda: ScreenModel(WithoutDevices(cell)))
     async with app.run_test(size=(100, 30)) as pilot:
         await until(lambda: app.model is not None)
         await press(pilot, "5")
@@ -64,7 +64,7 @@ async def opened_history(cell: Cell) -> AsyncIterator[Pilot[int]]:
 
 async def test_what_is_not_done_says_why_and_changes_nothing(cell: Cell, runs: list[ProposedRun]) -> None:
     earlier, latest = (run.folder.path.name for run in runs)
-    async with attended(WithoutDevices(cell.path)) as model:
+    async with attended(WithoutDevices(cell)) as model:
         await until(lambda: bool(model.runs))
         with pytest.raises(UsageError, match=f"no run before {earlier} identified a geometry"):
             await model.perform(ScreenAction.COMPARE, earlier)
@@ -83,7 +83,7 @@ async def test_what_is_not_done_says_why_and_changes_nothing(cell: Cell, runs: l
 
 async def test_a_history_that_cannot_be_read_says_why(cell: Cell, runs: list[ProposedRun]) -> None:
     cell.config_path.unlink()
-    async with attended(WithoutDevices(cell.path)) as model:
+    async with attended(WithoutDevices(cell)) as model:
         await until(lambda: model.runs == ())
         assert "cannot be read" in model.shown("history")["comparison"][0][-1]
 
@@ -202,5 +202,5 @@ async def test_a_forged_run_is_not_opened(cell: Cell, runs: list[ProposedRun]) -
     del record["crc"]
     journal.write_bytes(with_checksum(record) + b"".join(others))
     with pytest.raises(FileError, match="a geometry has other parameters"):
-        await Workplace(cell.path).open_run(runs[1].folder.path.name)
-    await Workplace(cell.path).open_run(runs[0].folder.path.name)
+        await Workplace(cell).open_run(runs[1].folder.path.name)
+    await Workplace(cell).open_run(runs[0].folder.path.name)

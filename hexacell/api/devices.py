@@ -46,8 +46,5 @@ class LiveDevices:
         self._shown = snapshot
 
     def _complete(self) -> LiveSnapshot | None:
-        if (shown := self._shown) is None or self._follower.is_over:
-            return None
-        told = [one.shown_mm is not None or one.problem for one in shown.gauges]
-        told += [one.value is not None or one.problem for one in (shown.encoders, shown.controller)]
-        return shown if all(told) else None
+        shown = self._shown
+        return shown if shown is not None and shown.is_complete and not self._follower.is_over else None

@@ -110,9 +110,7 @@ class FurtherFileSettings(Section):
     """A file beside ``config`` that has the rest of the geometry; the keys mean what they mean there."""
 
     config: Text = key(..., "file with a part of the geometry, relative to the cell file")
-    config_format: Text = key(
-        ..., "toml, json, yaml, urdf, linuxcnc-ini, linuxcnc-hal, template, or one that a plug-in adds"
-    )
+    config_format: Text = key(..., FORMATS)
     config_options: dict[str, Any] = key({}, "where that format finds the numbers, see docs/linuxcnc.md")
     taught: Text | None = key(None, "copy of this file, from the same day as that of the first one")
 

@@ -17,7 +17,7 @@ from drivers.simulated.linuxcnc.server import SimulatedController
 from hexacell.cell.robot import ControllerSettings
 from tests.benchmarks.figures import at_most
 from tests.benchmarks.samples import sample
-from tests.drivers.conformance.test_encoders import MachineInTime
+from tests.drivers.conformance.test_controllers import MachineInTime
 from tests.drivers.controllers.opcua.faults import FAULTS, moved_in_spite_of, repair
 from tests.drivers.controllers.opcua.plc import PlcServer
 from tests.drivers.controllers.opcua.test_controller import ALL, PlcTwin, settings_of

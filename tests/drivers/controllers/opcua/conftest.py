@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.drivers.conformance.test_encoders import MachineInTime
+from tests.drivers.conformance.test_controllers import MachineInTime
 from tests.drivers.controllers.opcua.faults import repair
 from tests.drivers.controllers.opcua.plc import PlcServer
 

@@ -23,7 +23,7 @@ from hexacell.cell.robot import ControllerSettings
 from hexacell.cell.simulation import FaultKind
 from hexacell.errors import DeviceError, UsageError
 from hexacell.kinematics.pose import Pose
-from tests.drivers.conformance.test_encoders import MachineInTime
+from tests.drivers.conformance.test_controllers import MachineInTime
 from tests.drivers.controllers.opcua.plc import VT, PlcServer
 
 ALL = frozenset(StartupAction)

@@ -1,16 +1,19 @@
-"""Orders to a LinuxCNC of which a test wants a single query over the connection for commands."""
+"""What a LinuxCNC that is homed says, for tests that want one number of it."""
 
-from drivers.controllers.linuxcnc.controller import LinuxcncrshController
+from drivers.interfaces import Controller
 from hexacell.kinematics.pose import Pose
 
 
-async def joints_of(driver: LinuxcncrshController) -> tuple[float, ...]:
+async def joints_of(driver: Controller) -> tuple[float, ...]:
     """The six joints as the controller has them, mm."""
-    async with driver._order:
-        return await (await driver._session.synchronized()).joints()
+    reported = await driver.position()
+    assert reported is not None
+    assert reported.joints is not None
+    return reported.joints
 
 
-async def pose_of(driver: LinuxcncrshController) -> Pose:
+async def pose_of(driver: Controller) -> Pose:
     """The actual pose by the controller's own kinematics, mm and deg."""
-    async with driver._order:
-        return await (await driver._session.synchronized()).pose()
+    reported = await driver.position()
+    assert reported is not None
+    return reported.pose

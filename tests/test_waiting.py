@@ -14,7 +14,6 @@ ALLOWED = {
     "cli/test_run_stopped.py": "compares a moment with those in a journal",
     "conftest.py": "how long a test's remains may last before the test fails",
     "drivers/controllers/adapter/faulty_program.py": "is a robot, whose moves take time",
-    "drivers/controllers/linuxcnc/test_status_channel.py": "outlasts a limit, which nobody may use",
     "drivers/controllers/opcua/plc.py": "is a PLC, which works in cycles",
     "drivers/encoders/test_lifetime.py": "cancels at sixty different moments",
     "drivers/simulated/test_followed_controller.py": "has programs that show where a robot is by now",

@@ -159,7 +159,7 @@ def _judged(entry):
 
 WRITERS = {
     "drivers/controllers/adapter/served_robot.py",  # answers another program, in JSON
-    "drivers/controllers/linuxcnc_module/program.py",  # likewise
+    "drivers/controllers/linuxcnc/module_program.py",  # likewise
     "hexacell/cli/commands/completion.py",  # made of the program's own words
     "drivers/controllers/linuxcnc/set_pins.py",  # commands of their own: printable() in each of them
     "drivers/controllers/linuxcnc/restart.py",

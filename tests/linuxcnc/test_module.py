@@ -7,8 +7,11 @@ from statistics import median
 
 import pytest
 
-from drivers.controllers.linuxcnc.controller import LinuxcncrshController
-from drivers.controllers.linuxcnc_module.controller import LinuxcncController, LinuxcncOptions
+from drivers.controllers.linuxcnc.controller import (
+    LinuxcncModuleController,
+    LinuxcncOptions,
+    LinuxcncrshController,
+)
 from drivers.errors import ConnectionLost, MotionInterrupted, MoveRefused, PoseRefused, StartupNotPermitted
 from drivers.interfaces import Controller, StartupAction
 from hexacell.cell.loader import load_cell
@@ -34,8 +37,8 @@ def settings_of(machine: LinuxCNC) -> ControllerSettings:
 
 
 @pytest.fixture
-async def driver(linuxcnc: LinuxCNC) -> AsyncIterator[LinuxcncController]:
-    made = LinuxcncController(settings_of(linuxcnc))
+async def driver(linuxcnc: LinuxCNC) -> AsyncIterator[LinuxcncModuleController]:
+    made = LinuxcncModuleController(settings_of(linuxcnc))
     await made.open()
     yield made
     await made.close()
@@ -64,7 +67,7 @@ async def begun(driver: Controller, pose: Pose, duration_s: float) -> asyncio.Ta
     return moving
 
 
-async def test_it_gets_ready_moves_and_stops(driver: LinuxcncController) -> None:
+async def test_it_gets_ready_moves_and_stops(driver: Controller) -> None:
     with pytest.raises(StartupNotPermitted):
         await driver.prepare(frozenset())
     assert await driver.position() is None
@@ -80,7 +83,7 @@ async def test_it_gets_ready_moves_and_stops(driver: LinuxcncController) -> None
     assert await is_at(driver, BACK)
 
 
-async def test_joints_are_those_of_linuxcncrsh(linuxcnc: LinuxCNC, driver: LinuxcncController) -> None:
+async def test_joints_are_those_of_linuxcncrsh(linuxcnc, driver) -> None:
     await driver.prepare(ALL)
     await driver.move(THERE, MOVE_S)
     other = LinuxcncrshController(load_cell(linuxcnc.folder / "cell.toml").settings.controller)
@@ -91,7 +94,7 @@ async def test_joints_are_those_of_linuxcncrsh(linuxcnc: LinuxCNC, driver: Linux
     assert await driver.joints_now() == pytest.approx(expected.joints, abs=1e-5)
 
 
-async def test_what_it_refuses_is_named_with_its_axis(driver: LinuxcncController) -> None:
+async def test_what_it_refuses_is_named_with_its_axis(driver: Controller) -> None:
     await driver.prepare(ALL)
     with pytest.raises(PoseRefused, match="limit") as caught:
         await driver.move(Pose(0.0, 0.0, 550.0, 50.0, 0.0, 0.0), MOVE_S)
@@ -141,7 +144,7 @@ async def crash(machine: LinuxCNC) -> None:
     [(emergency_stop, "controller LinuxCNC"), (crash, "LinuxCNC (has ended|does not run)")],
 )
 async def test_a_fault_in_a_move_is_named(
-    linuxcnc: LinuxCNC, driver: LinuxcncController, fault: Callable[[LinuxCNC], Awaitable[None]], words: str
+    linuxcnc: LinuxCNC, driver: Controller, fault: Callable[[LinuxCNC], Awaitable[None]], words: str
 ) -> None:
     await driver.prepare(ALL)
     moving = await begun(driver, THERE, 20.0)

@@ -42,6 +42,8 @@ class AdapterController:
     """
 
     Options: type[ControllerOptions] = AdapterOptions
+    converts_units = False
+    """Whether the program converts what a controller reports in ``controller.unit_mm``."""
 
     def __init__(
         self,
@@ -53,7 +55,7 @@ class AdapterController:
     ) -> None:
         program = program or cast("AdapterOptions", settings.options).program
         self._name = program.name
-        if settings.unit_mm != 1.0:
+        if settings.unit_mm != 1.0 and not self.converts_units:
             raise UsageError("the adapter counts in mm", action="Remove controller.unit_mm")
         self._settings, self._timeouts = settings, timeouts
         self._session = Session(program, settings, timeouts, trace, self._lose)
@@ -218,15 +220,16 @@ class AdapterController:
             raise
 
     async def _make_ready(self, link: Link, permitted: interfaces.StartupActions, stops: int) -> None:
-        if self._is_reloading:  # then it was on, and this driver switched it off
-            permitted |= {StartupAction.SWITCH_ON}
         last: StartupAction | None = None
         while (action := self._next_action(status := await self._undisturbed(link))) is not None:
             if action is last:
                 said = "; ".join(status.errors) or "it gives no reason"
                 problem = f"says that '{_REQUESTS[action]}' is done, which had no effect: {said}"
                 raise DeviceError(problem, subject=self._name, action="Look at the controller itself")
-            if action not in permitted:
+            # This driver has switched it off, unless there was an emergency stop since.
+            self._is_reloading &= action is not StartupAction.RESET_ESTOP
+            is_ours = self._is_reloading and action is StartupAction.SWITCH_ON
+            if not is_ours and action not in permitted:
                 raise errors.StartupNotPermitted(action, self._name)
             permitted -= {action}  # what is needed again was undone by somebody
             if self._stop_count != stops:
@@ -264,10 +267,15 @@ class AdapterController:
             require_unmoved(before, joints, self._settings.position_tolerance_mm, self._name)
         self._joints_before_reload, self._here = None, pose_of(found.pose)
 
+    def _is_later_estop(self, status: Status) -> bool:
+        """Whether it was not in this emergency stop when it was started."""
+        del status
+        return self._was_enabled
+
     def _next_action(self, status: Status) -> StartupAction | None:
         """The next action that it needs before it can move; None if it is ready."""
         if status.estop:
-            is_later = self._was_enabled
+            is_later = self._is_later_estop(status)
             return StartupAction.RESET_ESTOP if is_later else StartupAction.RESET_INITIAL_ESTOP
         if not status.enabled:
             return StartupAction.SWITCH_ON

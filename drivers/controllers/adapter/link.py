@@ -16,6 +16,7 @@ from typing import Any, Generic, Self, TypeVar
 
 from pydantic import ValidationError
 
+from drivers.controllers.adapter.local_program import LocalProgram
 from drivers.controllers.adapter.masking import Masking, revealed
 from drivers.controllers.adapter.messages import LONGEST_LINE, Answer, Failed, Hello, Message, pose_of
 from drivers.controllers.adapter.options import Program
@@ -84,7 +85,7 @@ class Link:
         self._pending: dict[int, Request[Any]] = {}
         self._asked = 0
         self._error: ConnectionLost | None = None
-        self._process: ProgramProcess | None = None
+        self._process: ProgramProcess | LocalProgram | None = None
         self._reading: asyncio.Task[None] | None = None
 
     @classmethod
@@ -166,12 +167,16 @@ class Link:
         if (error := self._error) is not None:
             raise type(error)(error.problem, subject=error.subject, action=error.action)
 
-    def fail(self, problem: str, kind: type[ConnectionLost] = ConnectionLost) -> None:
+    def fail(
+        self,
+        problem: str,
+        kind: type[ConnectionLost] = ConnectionLost,
+        action: str | None = "Look at the program's own messages in the log",
+    ) -> None:
         """Break the link: the program's stdin or its connection ends, at which it stops the robot."""
         self._writer.close()
         if self._error is not None:
             return
-        action = "Look at the program's own messages in the log"
         self._error = kind(self._masked(problem), subject=self._program.name, action=action)
         _log.warning("%s", self._error)
         for request in self._pending.values():
@@ -192,13 +197,16 @@ class Link:
     async def _begin(self) -> None:
         program = self._program
         try:
-            if not program.command:
+            if program.robot is not None:
+                self._process = await LocalProgram.start(program.robot(), LONGEST_LINE)
+            elif program.command:
+                self._process = await ProgramProcess.start(program, self._masked, LONGEST_LINE)
+            else:
                 async with asyncio.timeout(self._timeouts.answer):
                     self._reader, self._writer = await asyncio.open_connection(
                         *program.address, limit=LONGEST_LINE
                     )
-            else:
-                self._process = await ProgramProcess.start(program, self._masked, LONGEST_LINE)
+            if self._process is not None:
                 self._reader, self._writer = self._process.stdout, self._process.stdin
         except OSError as error:  # of which TimeoutError is one
             number = error.errno or 0  # negative from getaddrinfo, which has its own text
@@ -256,7 +264,10 @@ class Link:
             rest = end.partial if isinstance(end, asyncio.IncompleteReadError) else b""
             self._record(TrafficDirection.RECEIVED, rest)
             self._writer.close()
-            self.fail(await self._end() + (f", in the middle of a line: {_shown(rest)}" if rest else ""))
+            if isinstance(how := await self._ending(), ConnectionLost):
+                self.fail(how.problem, type(how), how.action)
+            else:
+                self.fail(how + (f", in the middle of a line: {_shown(rest)}" if rest else ""))
         with suppress(OSError):  # a program that waits for its reader would not see that its stdin ended
             while await self._reader.read(_CHUNK):
                 pass
@@ -283,8 +294,8 @@ class Link:
         request.answer.set_result(found)
         return None
 
-    async def _end(self) -> str:
-        """How it ended, in words."""
+    async def _ending(self) -> ConnectionLost | str:
+        """How it ended."""
         if self._process is not None:
             return await self._process.ending()
         return "closed the connection: it was ended or restarted, or serves somebody else"

@@ -1,12 +1,13 @@
 """Where the program of an adapter is: ``[controller.options]`` of the cell file."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
 from pydantic import field_validator, model_validator
 
+from drivers.controllers.adapter.local_program import LocalRobot
 from hexacell.addresses import require_host
 from hexacell.cell.fields import Text, accepted, broken_rule, key
 from hexacell.cell.robot import ControllerOptions
@@ -19,6 +20,7 @@ class Program:
     Attributes:
         command: what starts it; empty where it is connected to.
         address: host and port of its TCP server.
+        robot: makes the robot that is served within this process, where no other one does.
         settings: what it is told with ``hello``; what is secret of it enters no trace, log or message.
         name: the controller as messages name it.
         protocol: the name of its protocol in the cell file.
@@ -27,6 +29,7 @@ class Program:
     name: str
     command: tuple[str, ...] = ()
     address: tuple[str, int] = ("", 0)
+    robot: Callable[[], LocalRobot] | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
     protocol: str = "adapter"
 

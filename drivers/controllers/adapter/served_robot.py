@@ -16,7 +16,7 @@ from contextlib import suppress
 from typing import Any, Protocol, TextIO
 
 VERSION = 1
-AGAIN_S = 0.1
+IDLE_S, AGAIN_S = 0.02, 0.1
 Told = Mapping[str, Any]
 Report = Callable[[Sequence[float]], None]
 """Tells where the robot is on its way: x, y, z, mm, and a, b, c, deg."""
@@ -55,14 +55,24 @@ class Robot(Protocol):
         """Stop the motion in place, at once; returns at rest."""
 
 
-def serve(robot: Robot, lines: Iterable[str] = sys.stdin, answers: TextIO = sys.stdout) -> None:
-    """Answer each line of requests until they end; then the robot is stopped."""
-    _Service(robot, lines, answers).run()
+def serve(
+    robot: Robot,
+    lines: Iterable[str] = sys.stdin,
+    answers: TextIO = sys.stdout,
+    ends: Callable[[Exception], bool] = lambda _error: False,
+) -> None:
+    """Answer each line of requests until they end; then the robot is stopped, if it is doing anything.
+
+    ``ends`` is given each error that is no answer: whether it ends the service.
+    """
+    _Service(robot, lines, answers, ends).run()
 
 
 class _Service:
-    def __init__(self, robot: Robot, lines: Iterable[str], answers: TextIO) -> None:
-        self._robot, self._lines, self._answers = robot, lines, answers
+    def __init__(
+        self, robot: Robot, lines: Iterable[str], answers: TextIO, ends: Callable[[Exception], bool]
+    ) -> None:
+        self._robot, self._lines, self._answers, self._ends = robot, lines, answers, ends
         self._writing = threading.Lock()
         self._orders: queue.SimpleQueue[Told | None] = queue.SimpleQueue()
 
@@ -71,16 +81,18 @@ class _Service:
         worker.start()
         for line in self._lines:
             request = json.loads(line)
-            if request["do"] in {"hello", "status", "position", "stop"}:
+            if request["do"] == "stop":  # what is asked before it may hang
+                threading.Thread(target=self._answer, args=(request,), daemon=True).start()
+            elif request["do"] in {"hello", "status", "position"}:
                 self._answer(request)
             else:  # what takes its time; the others do not wait for it
                 self._orders.put(request)
         self._orders.put(None)
-        is_over = False
-        while not is_over:  # again, as the first one may precede the motion
-            self._robot.stop()  # nobody is there any more who could
+        worker.join(IDLE_S)
+        while worker.is_alive():  # again, as the first one may precede the motion
+            with suppress(FailedError):
+                self._robot.stop()  # nobody is there any more who could
             worker.join(AGAIN_S)
-            is_over = not worker.is_alive()
 
     def _work(self) -> None:
         while (request := self._orders.get()) is not None:
@@ -92,6 +104,8 @@ class _Service:
         except FailedError as failure:
             self._send(request, failed=failure.answer)
         except Exception as error:  # whatever fails in a controller's own library
+            if self._ends(error):
+                return
             traceback.print_exc()
             self._send(request, failed={"kind": "fault", "reason": f"{type(error).__name__}: {error}"})
         else:

@@ -15,10 +15,9 @@ from drivers.simulated.linuxcnc.server import SimulatedController
 from hexacell.cell.robot import ControllerSettings
 from hexacell.cell.simulation import FaultKind
 from hexacell.kinematics.pose import Pose
-from tests.drivers.simulated.linuxcnc.conftest import QUICK, FakeMachine
+from tests.drivers.simulated.linuxcnc.conftest import HASTY, QUICK, FakeMachine
 
 LEAST_S = 0.01
-HASTY = replace(QUICK, answer=0.5)
 
 
 class MachineInTime(FakeMachine):
@@ -74,7 +73,7 @@ class TestAdapter(conformance.ControllerConformance):
 
 class TestLinuxcncrsh(conformance.ControllerConformance):
     def driver(self, settings: ControllerSettings) -> Controller:
-        return LinuxcncrshController(settings, timeouts=HASTY)
+        return LinuxcncrshController(settings, timeouts=QUICK, limits=replace(HASTY, answer=0.5))
 
     @contextmanager
     def twin(self) -> Iterator[conformance.ControllerTwin]:

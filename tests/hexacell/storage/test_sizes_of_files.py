@@ -63,7 +63,7 @@ ELSEWHERE = {
     "hexacell/runs/cell_lock.py": "reads a bounded note, and tables of the kernel's",
     "hexacell/runs/archive.py": "creates a database",
     "hexacell/storage/opcua_certificate.py": "writes a new key",
-    "drivers/controllers/linuxcnc_module/program.py": "a table of the kernel's",
+    "drivers/controllers/linuxcnc/module_program.py": "a table of the kernel's",
     "hexacell/services/unattended/outbox.py": "a folder",
     "hexacell/run_process/run_socket.py": "a folder",
     "hexacell/cli/process.py": "writes a report",

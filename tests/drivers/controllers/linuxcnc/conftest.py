@@ -1,251 +1,144 @@
-"""A server that follows a script, and drivers that talk to it."""
+"""A simulated LinuxCNC whose answers a test alters line by line, and the driver before it."""
 
-import asyncio
-from collections.abc import AsyncIterator, Callable, Coroutine
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import suppress
 from enum import Enum, auto
 from typing import Any
 
 import pytest
 
+from drivers.controllers.adapter.link import Timeouts
+from drivers.controllers.linuxcnc import machine as orders
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
-from drivers.controllers.linuxcnc.protocol import Timeouts
-from drivers.wire_trace import WireTrace
+from drivers.controllers.linuxcnc.shell_protocol import Limits
+from drivers.interfaces import StartupAction
+from drivers.simulated.linuxcnc import server
+from drivers.simulated.linuxcnc.state import ConnectionCut
 from hexacell.cell.robot import ControllerSettings
 from hexacell.kinematics.pose import Pose
+from tests.drivers.conformance.test_controllers import MachineInTime
 
-
-def said(text: str) -> list[tuple[str, bytes]]:
-    """Exchanges, separated by ``|``: ``get estop: ON`` is answered by ESTOP ON, ``set mode mdi`` by ACK.
-
-    ``set machine on: NAK`` is refused.
-    """
-    exchanges = []
-    for exchange in text.split(" | "):
-        asked, _, answer = exchange.partition(": ")
-        verb, name = asked.split()[:2]
-        if verb == "get":
-            exchanges.append((asked, f"{name.upper()} {answer}\r\n".encode()))
-        else:
-            exchanges.append((asked, f"SET {name.upper()} {answer or 'ACK'}\n\r".encode()))
-    return exchanges
-
-
-TARGET = Pose(10.0, 20.0, 560.0, 5.0, -4.0, 3.0)
-MOVE_S = 3.0
-MDI = (
-    "set mdi G21 G53 G93 G1 X10.00000000 Y20.00000000 Z560.00000000 A5.00000000 B-4.00000000 C3.00000000 "
-    "F20.00000000"
+ALL = frozenset(StartupAction)
+TARGET, AWAY, UNREACHABLE = (
+    Pose(10.0, 20.0, 560.0, 5.0, -4.0, 3.0),
+    Pose(5.0, 0.0, 550.0),
+    Pose(0.0, 0.0, 2000.0),
 )
-ACK, NAK = b"SET MDI ACK\n\r", b"SET MDI NAK\n\r"
-ARRIVED = b"ABS_ACT_POS 10.000000 20.000000 560.000000 5.000000 -4.000000 3.000000\r\n"
-HALF_WAY = b"ABS_ACT_POS 5.000000 10.000000 555.000000 2.500000 -2.000000 1.500000\r\n"
-MOVED = [(MDI, ACK), ("get abs_act_pos", ARRIVED)]
-[RESTORED] = said("set mdi G94 G0")
-[NO_ERROR] = said("get error: OK")
-[AGAIN_IN_CONTROL] = said("set enable EMCTOO")
-[ABORT] = said("set abort")
-JOINTS = ("get joint_pos", b"JOINT_POS 1 2 3 4 5 6\r\n")
-REFUSED = [(MDI, NAK), *said("get enable: ON")]
-NO_ESTOP, IN_ESTOP = said("get estop: OFF"), said("get estop: ON")
-IS_ON, IS_OFF = said("get machine: ON"), said("get machine: OFF")
-HOMED = said("get joint_homed: YES YES YES YES YES YES")
-NOT_HOMED = said("get joint_homed: NO YES NO NO NO NO")
-OFF, READY = [*NO_ESTOP, *IS_OFF], [*NO_ESTOP, *IS_ON, *HOMED]
-SWITCHING_ON = [*OFF, *said("set machine on"), *IS_ON]
-ON_NOT_HOMED = [*NO_ESTOP, *IS_ON, *NOT_HOMED]
-MDI_MODE = said("set mode mdi | get mode: MDI")
-[UNITS, CODES, OFFSETS, OVERRIDE] = OWN_COORDINATES = said(
-    "get user_linear_units: MM | get program_codes: G80 G17 G40 G21 G90 G94 G54 G49 G92.2 F0 S0 | "
-    "get pos_offset: 0.000000 0.000000 -0.000000 0.000000 0.000000 0.000000 | get feed_override: 100"
-)
-TAKING_CONTROL = said(
-    "set enable EMCTOO | get error: left over from somebody else | get error: OK | set set_wait done"
-)
-IN_JOINT_MODE = said("set mode manual | get teleop_enable: NO | get error: OK")
-HOMING = [*said("set home -1"), *NOT_HOMED, *HOMED]
-
-
-PATIENT = Timeouts(explanation=0.05, poll=0.002)
-IMPATIENT = Timeouts(
-    answer=0.4,
-    command=0.4,
-    explanation=0.05,
-    poll=0.002,
-    arrival=0.02,
-    stop=0.6,
-    switch=0.02,
-    reconnect=0.2,
-)
-"""For tests in which something does not happen."""
+MOVE_S, LONG_S = 0.02, 30.0
+HELLO = "hello EMC hexacell 1.0"
+LIMITS = Limits(answer=0.5, command=0.5, explanation=0.05, arrival=0.05, stop=0.3, rest=0.3)
+TIMEOUTS = Timeouts(arrival=0.02, reconnect=0.3, beyond_move=0.3, stop=0.6, poll=0.005, closing=1.0)
 
 
 class Then(Enum):
-    """What a script can do beside sending bytes."""
+    """What a server can do beside sending bytes."""
 
     SAY_NOTHING = auto()
     HANG_UP = auto()
 
 
-class Pause(asyncio.Event):
-    """A place in a script at which the server waits until the test sets it."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.reached = asyncio.Event()
-
-    async def reached_by(self, order: Coroutine[Any, Any, Any]) -> asyncio.Task[Any]:
-        """The task of this order, once the server waits here."""
-        task = asyncio.create_task(order)
-        await self.reached.wait()
-        return task
+Said = bytes | Then | Callable[[], bytes | Then | None]
 
 
-Step = bytes | Pause | Then
-Exchange = tuple[str, Step] | tuple[str, Step, Step] | tuple[str, Step, Step, Step]
+class _Client(server._Client):
+    _server: "AlteredController"
 
-GREETING: list[Exchange] = [
-    ("hello EMC hexacell 1.0", b"HELLO ACK EMCNETSVR 1.1\r\n"),
-    ("set echo off", b"set echo off\r\n"),
-    *said("set verbose on | set enable EMCTOO"),
-]
-OPENING = [*GREETING, *said("set set_wait done | get inifile: /home/operator/machine.ini")]
-AT_REST = b"JOINT_POS 0.000000 0.000000 0.000000 0.000000 -0.000000 0.000000\r\n"
-STOPPED: list[Exchange] = [*said("set abort"), *[("get joint_pos", AT_REST)] * 3]
-STOPPING = [*GREETING, *STOPPED]
+    def _execute(self, line: str) -> None:
+        if not line:
+            return
+        self._server.lines.append(line)
+        said = self._server.says.get(line) or self._server.says.get(" ".join(line.split()[:2]))
+        if callable(said):
+            said = said()
+        if said is None:
+            super()._execute(line)
+        elif said is Then.HANG_UP:
+            raise ConnectionCut
+        elif isinstance(said, bytes):
+            self._greeted = True
+            self._write(said)
 
 
-class ScriptedServer:
-    """Plays one conversation to each connection in turn, and remembers what did not follow it.
+class _Handler(server._Handler):
+    server: "AlteredController"
 
-    ``afterwards`` answers what is asked again and again once a conversation has been played; the
-    last of several answers is repeated.
+    def handle(self) -> None:
+        self.server.connections += 1
+        client = _Client(self.server, self.request.sendall)
+        with suppress(OSError, ConnectionCut):
+            while data := self.request.recv(4096):
+                if not self.server.is_silent:
+                    client.receive(data)
+
+
+class AlteredController(server.SimulatedController):
+    """The simulated LinuxCNC, as far as ``says`` has no other answer to a line, or to its two first words.
+
+    Attributes:
+        lines: that it received, over all connections.
+        connections: how many there were.
     """
 
-    def __init__(self, *conversations: list[Exchange]) -> None:
-        self.deviations: list[str] = []
-        self.afterwards: dict[str, bytes | list[bytes] | Callable[[], bytes]] = {}
-        self.port = 0
+    handler = _Handler
+
+    def __init__(self, machine: MachineInTime, settings: ControllerSettings) -> None:
+        self.says: dict[str, Said] = {}
+        self.lines: list[str] = []
         self.connections = 0
-        self._conversing: set[asyncio.Task[None]] = set()
-        self._left = [list(conversation) for conversation in conversations]
-        self._waiting = iter(self._left)
-        self._server: asyncio.Server | None = None
+        super().__init__(machine, settings)
 
-    async def start(self) -> None:
-        self._server = await asyncio.start_server(self._converse, "127.0.0.1", self.port)
-        self.port = self._server.sockets[0].getsockname()[1]
-
-    def stop_listening(self) -> None:
-        """Connections go on, and no new one is taken."""
-        assert self._server is not None
-        self._server.close()
-
-    async def close(self) -> None:
-        assert self._server is not None
-        self.stop_listening()
-        for task in self._conversing:
-            task.cancel()
-        await asyncio.gather(*self._conversing)
-        await self._server.wait_closed()
-
-    def assert_followed(self) -> None:
-        assert self.deviations == []
-        assert [conversation for conversation in self._left if conversation] == []
-
-    async def _converse(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        task = asyncio.current_task()
-        assert task is not None
-        self._conversing.add(task)
-        self.connections += 1
-        conversation = next(self._waiting, None)
-        if conversation is None:
-            self.deviations.append("one connection more than the script has")
-        with suppress(asyncio.CancelledError, OSError):
-            while conversation is not None and (line := (await reader.readline()).decode()):
-                if not await self._answer(line.removesuffix("\r\n"), conversation, writer):
-                    break
-        writer.transport.abort()
-
-    async def _answer(self, line: str, conversation: list[Exchange], writer: asyncio.StreamWriter) -> bool:
-        if not conversation and line in self.afterwards:
-            writer.write(self._afterwards(line))
-            return True
-        expected, *steps = conversation.pop(0) if conversation else ("nothing",)
-        if line != expected:
-            self.deviations.append(f"{line!r} came where {expected!r} was expected")
-            return False
-        for step in steps:
-            if step is Then.HANG_UP:
-                return False
-            if isinstance(step, Pause):
-                step.reached.set()
-                await step.wait()
-            elif isinstance(step, bytes):
-                writer.write(step)
-        return True
-
-    def _afterwards(self, line: str) -> bytes:
-        answer = self.afterwards[line]
-        if isinstance(answer, bytes):
-            return answer
-        if callable(answer):
-            return answer()
-        return answer.pop(0) if len(answer) > 1 else answer[0]
+    def count(self, line: str) -> int:
+        """How often a line came that begins so."""
+        return sum(one.startswith(line) for one in self.lines)
 
 
-class Play:
-    """Scripts, and drivers that talk to servers which follow them."""
-
-    GREETING = GREETING
-    OPENING = OPENING
-    STOPPING = STOPPING
-    STOPPED = STOPPED
-    AT_REST = AT_REST
-    SILENCE = Then.SAY_NOTHING
-    HANG_UP = Then.HANG_UP
-    Pause = Pause
-    IMPATIENT = IMPATIENT
-
-    def __init__(self) -> None:
-        self.patience = PATIENT
-        self.servers: list[ScriptedServer] = []
-        self._drivers: list[LinuxcncrshController] = []
-
-    async def driver(
-        self, *conversations: list[Exchange], trace: WireTrace | None = None, **settings: object
-    ) -> LinuxcncrshController:
-        """A driver for a server that plays ``conversations``, one to each connection."""
-        server = ScriptedServer(*conversations)
-        self.servers.append(server)
-        await server.start()
-        stated = {"config": "machine.ini", "port": server.port, **settings}
-        values = ControllerSettings.model_validate(stated)
-        self._drivers.append(LinuxcncrshController(values, trace=trace, timeouts=self.patience))
-        return self._drivers[-1]
-
-    async def opened(
-        self, conversation: list[Exchange], *others: list[Exchange], **settings: Any
-    ) -> LinuxcncrshController:
-        """The same, connected: ``conversation`` goes on after the opening."""
-        driver = await self.driver([*OPENING, *conversation], *others, **settings)
-        await driver.open()
-        return driver
-
-    async def end(self) -> None:
-        """Close everything; fail unless every conversation was played to its end."""
-        for driver in self._drivers:
-            driver._has_changed_modes = False  # a test that is about restoring them closes it itself
-            await driver.close()
-        for server in self.servers:
-            await server.close()
-        for server in self.servers:
-            server.assert_followed()
+def once(answer: bytes | Then) -> Callable[[], bytes | Then | None]:
+    """This answer to the first of several such lines."""
+    left = [answer]
+    return lambda: left.pop() if left else None
 
 
 @pytest.fixture
-async def play() -> AsyncIterator[Play]:
-    """Servers that follow scripts; a test fails unless each script was played to its end."""
-    playing = Play()
-    yield playing
-    await playing.end()
+def machine() -> MachineInTime:
+    return MachineInTime()
+
+
+@pytest.fixture
+def controller(machine: MachineInTime, monkeypatch: pytest.MonkeyPatch) -> Iterator[AlteredController]:
+    for limit in ("SWITCH_S", "MESSAGE_S"):
+        monkeypatch.setattr(orders, limit, 0.1)
+    with AlteredController(machine, ControllerSettings(config="folder/machine.ini")) as made:
+        yield made
+
+
+Make = Callable[..., LinuxcncrshController]
+
+
+@pytest.fixture
+async def make(controller: AlteredController) -> AsyncIterator[Make]:
+    """Makes drivers before ``controller``; keywords are settings of it."""
+    made: list[LinuxcncrshController] = []
+
+    def driver(trace: Any = None, limits: Limits = LIMITS, **settings: object) -> LinuxcncrshController:
+        values = ControllerSettings.model_validate({"config": "x", "port": controller.port, **settings})
+        made.append(LinuxcncrshController(values, trace=trace, timeouts=TIMEOUTS, limits=limits))
+        return made[-1]
+
+    yield driver
+    for one in made:
+        await one.close()
+
+
+@pytest.fixture
+async def driver(make: Make) -> LinuxcncrshController:
+    """A driver that is open."""
+    made = make()
+    await made.open()
+    return made
+
+
+@pytest.fixture
+async def ready(driver: LinuxcncrshController) -> LinuxcncrshController:
+    """A driver whose machine is ready to move."""
+    await driver.prepare(ALL)
+    return driver

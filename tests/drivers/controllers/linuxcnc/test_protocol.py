@@ -5,8 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.controllers import poses
-from drivers.controllers.linuxcnc import gcode, protocol
-from hexacell.errors import UsageError
+from drivers.controllers.adapter.served_robot import FailedError
+from drivers.controllers.linuxcnc import gcode
+from drivers.controllers.linuxcnc import shell_protocol as protocol
 from hexacell.kinematics.pose import Pose
 
 WORDS = st.text(st.characters(min_codepoint=33, max_codepoint=126), min_size=1)
@@ -29,8 +30,8 @@ def test_lines_are_split_at_any_line_end_and_any_packet_boundary(lines, data):
 @given(st.text())
 def test_an_encoded_command_fits_the_server_and_is_one_line(command):
     try:
-        line = protocol.encode_command(command, "controller")
-    except UsageError:
+        line = protocol.encode_command(command)
+    except FailedError:
         assert len(command.encode()) > 253 or "\r" in command or "\n" in command
     else:
         assert len(line) <= 255
@@ -45,7 +46,7 @@ def test_a_timed_move_keeps_pose_and_duration_and_fits_a_line(pose, duration_s):
     assert "".join(letters) == "GGGGXYZABCF"
     assert values[4:10] == pytest.approx(pose.as_tuple(), abs=1e-7)
     assert 60.0 / values[10] == pytest.approx(duration_s, rel=1e-4)
-    protocol.encode_command(f"set mdi {gcode.timed_move(pose.as_tuple(), duration_s)}", "controller")
+    protocol.encode_command(f"set mdi {gcode.timed_move(pose.as_tuple(), duration_s)}")
 
 
 @pytest.mark.parametrize(
@@ -112,7 +113,7 @@ def test_explanations_are_no_answers_and_further_positions_of_other_axes() -> No
 def test_positions_are_six_finite_numbers_or_refused(text):
     try:
         positions = protocol.parse_positions(text)
-    except ValueError:
+    except FailedError:
         return
     assert len(positions) == 6
     assert all(abs(position) < float("inf") for position in positions)

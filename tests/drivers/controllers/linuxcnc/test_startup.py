@@ -1,206 +1,289 @@
-"""Preparing for motion: every state is verified after its command is acknowledged."""
+"""From any state to one in which it accepts moves, and reloading; each step is verified."""
+
+import asyncio
+import os
+import shutil
+import signal
+import sys
 
 import pytest
 
-from drivers.errors import CommandRefused, MotionInterrupted, MoveRefused, StartupNotPermitted
+from drivers.controllers.reload_command import run_reload_command
+from drivers.errors import (
+    CommandRefused,
+    ConnectionLost,
+    MotionInterrupted,
+    MoveRefused,
+    StartupNotPermitted,
+)
 from drivers.interfaces import StartupAction
 from hexacell.errors import DeviceError
-from hexacell.kinematics.pose import Pose
-from tests.drivers.controllers.linuxcnc.conftest import (
-    CODES,
-    HOMED,
-    HOMING,
-    IN_ESTOP,
-    IN_JOINT_MODE,
-    IS_ON,
-    MDI_MODE,
-    NO_ERROR,
-    NO_ESTOP,
-    NOT_HOMED,
-    OFF,
-    ON_NOT_HOMED,
-    OWN_COORDINATES,
-    READY,
-    SWITCHING_ON,
-    TAKING_CONTROL,
-    UNITS,
-    said,
-)
+from tests.drivers.controllers.linuxcnc.conftest import ALL, MOVE_S, TARGET, Then, once
+from tests.waiting import cancel, until
 
-ALL = frozenset(StartupAction)
-RESETTING = [*IN_ESTOP, *NOT_HOMED, *said("set estop off"), *NO_ESTOP]
-UNTIL_HOMED = [*TAKING_CONTROL, *SWITCHING_ON]
-UNTIL_MDI = [*UNTIL_HOMED, *READY, *MDI_MODE]
+RESTARTED = frozenset({StartupAction.RESET_INITIAL_ESTOP, StartupAction.HOME})
+"""What the cell file permits; to be switched on again needs no permission."""
 
 
-async def test_prepare_leads_from_emergency_stop_and_teleoperation_to_mdi_and_waits_for_each(play) -> None:
-    until_homed = [*TAKING_CONTROL, *RESETTING, *SWITCHING_ON, *ON_NOT_HOMED, *OWN_COORDINATES]
-    homed = [*IN_JOINT_MODE, *HOMING, *READY, *MDI_MODE, *OWN_COORDINATES]
-    driver = await play.opened([*until_homed, *homed])
+@pytest.mark.parametrize("line", ["set mode mdi", "set machine on", "set estop off"])
+async def test_what_is_acknowledged_without_effect_is_asked_for_again_once(
+    driver, controller, line
+) -> None:
+    ack = f"SET {line.split()[1].upper()} ACK\n\r".encode()
+    controller.says[line] = once(ack)
     await driver.prepare(ALL)
-    leaving = said("set mode manual | get teleop_enable: YES | set teleop_enable off | get error: OK")
-    homed = [*leaving, *HOMING, *READY, *MDI_MODE, *OWN_COORDINATES]
-    driver = await play.opened([*UNTIL_HOMED, *ON_NOT_HOMED, *OWN_COORDINATES, *homed])
-    await driver.prepare(ALL)
-    reset = [*TAKING_CONTROL, *RESETTING[:-1], *IN_ESTOP, *NO_ESTOP, *SWITCHING_ON[:-1], OFF[-1], *IS_ON]
-    mode = said("set mode mdi | get mode: MANUAL | get mode: MDI")
-    driver = await play.opened([*reset, *READY, *mode, *OWN_COORDINATES])
-    await driver.prepare(ALL)
+    await driver.move(TARGET, MOVE_S)
+    await driver.reload(ALL)
+    if line == "set mode mdi":
+        return
+    controller.says[line] = ack
+    controller.state.set_estop(on=True)
+    with pytest.raises(DeviceError, match=f"'{line[4:]}' has no effect: it is"):
+        await driver.reload(ALL)
 
 
-async def test_a_mode_that_was_asked_for_without_effect_is_asked_for_again(play):
-    play.patience = play.IMPATIENT
-    driver = await play.opened([*UNTIL_HOMED, *READY, MDI_MODE[0]])
-    afterwards = play.servers[0].afterwards
-
-    def second_request() -> bytes:
-        afterwards["get mode"] = b"MODE MDI\r\n"
-        return MDI_MODE[0][1]
-
-    afterwards |= {"get mode": b"MODE MANUAL\r\n", "set mode mdi": second_request}
-    afterwards |= dict(OWN_COORDINATES)
-    await driver.prepare(ALL)
-
-
-async def test_a_machine_that_is_not_switched_on_without_a_reason_is_asked_again(play):
-    play.patience = play.IMPATIENT
-    driver = await play.opened([*TAKING_CONTROL, *SWITCHING_ON[:-1]])
-    afterwards = play.servers[0].afterwards
-
-    def second_request() -> bytes:
-        afterwards["get machine"] = IS_ON[0][1]
-        return SWITCHING_ON[-2][1]
-
-    afterwards |= {"get machine": OFF[-1][1], "get error": NO_ERROR[1], "set machine on": second_request}
-    afterwards |= dict([*NO_ESTOP, *HOMED, *MDI_MODE, *OWN_COORDINATES])
-    await driver.prepare(ALL)
-
-
-async def test_prepare_accepts_a_server_without_the_optional_queries(play):
-    unknown = [(asked, b"GET NAK\r\n") for asked, _ in OWN_COORDINATES for _twice in range(2)]
-    driver = await play.opened([*UNTIL_MDI, *unknown])
-    await driver.prepare(ALL)
-
-
-@pytest.mark.parametrize(
-    ("conversation", "states", "problem"),
-    [
-        (
-            [*TAKING_CONTROL, *RESETTING[:-1]],
-            dict(said("get estop: ON | get error: OK")),
-            "stays in emergency stop: it is in emergency stop. Release",
-        ),
-        (
-            [*TAKING_CONTROL, *SWITCHING_ON[:-1]],
-            dict(said("set machine on | get machine: OFF | get estop: OFF | get error: OK")),
-            "does not switch on: it is switched off",
-        ),
-        (
-            [*TAKING_CONTROL, *SWITCHING_ON[:-1]],
-            {  # asked for once: a second request would be none of the script
-                "get machine": b"MACHINE OFF\r\n",
-                "get error": [b"ERROR joint 3 following error\r\n", b"ERROR OK\r\n"],
-            },
-            "does not switch on: joint 3 following error",
-        ),
-        (
-            [*UNTIL_HOMED, *READY, MDI_MODE[0]],
-            dict([*said("set mode mdi | get mode: MANUAL"), *NO_ESTOP, *IS_ON, NO_ERROR]),
-            "does not enter MDI mode: it is on, and gives no reason",
-        ),
-        (
-            [*UNTIL_HOMED, *ON_NOT_HOMED, *OWN_COORDINATES, *IN_JOINT_MODE, HOMING[0]],
-            {
-                "get joint_homed": b"JOINT_HOMED NO NO NO NO NO NO\r\n",
-                "get error": [b"ERROR home switch of joint 2 not found\r\n", b"ERROR OK\r\n"],
-            },
-            r"is not homed after 0\.2 s: home switch of joint 2 not found",
-        ),
-    ],
-)
-async def test_an_acknowledged_command_without_effect_is_reported(play, conversation, states, problem):
-    play.patience = play.IMPATIENT
-    driver = await play.opened(conversation, homing_timeout_s=0.2)
-    play.servers[0].afterwards = states
-    with pytest.raises(DeviceError, match=problem) as caught:
-        await driver.prepare(ALL)
-    assert caught.value.subject == f"controller 127.0.0.1:{play.servers[0].port}"
-
-
-FALSE_COORDINATES = pytest.mark.parametrize(
-    ("conversation", "problem"),
-    [
-        (said("get user_linear_units: INCH"), "counts in inch, .*Set controller.unit_mm = 25.4"),
-        (said("get user_linear_units: CUSTOM"), r"counts in custom, .*Set \[TRAJ\] LINEAR_UNITS = mm"),
-        ([UNITS, *said("get program_codes: G0 G91 G49")], r"takes coordinates as relative \(G91\). G90"),
-        ([UNITS, *said("get program_codes: G0 G90 G43")], r"adds a tool length \(G43\). G49"),
-        ([UNITS, CODES, *said("get pos_offset: 0 -5.0 0 0 0 0")], r"adds an offset of 0 -5\.0 .*Clear it"),
-        ([UNITS, CODES, *said("get pos_offset: 0 garbled")], "'0 garbled' where six positions belong"),
-    ],
-)
-
-
-@FALSE_COORDINATES
-async def test_settings_that_falsify_coordinates_are_found_at_once(play, conversation, problem) -> None:
-    driver = await play.opened([*UNTIL_MDI, *conversation])
-    with pytest.raises(DeviceError, match=problem):
-        await driver.prepare(ALL)
-    with pytest.raises(MoveRefused, match=r"its last preparation failed\. Prepare it again"):
-        await driver.move(Pose(0.0, 0.0, 500.0), 1.0)
-    driver = await play.opened(conversation)
-    with pytest.raises(DeviceError, match=problem):
-        await driver.check()
-
-
-async def test_a_refusal_quotes_the_controllers_error_messages_also_without_a_nak(play) -> None:
-    refused = said("set machine on: NAK | get enable: ON")
-    errors = [("get error", f"ERROR drive {n} is cold\r\n".encode()) for n in (1, 2, 3, 4, 5, 5)]
-    driver = await play.opened([*TAKING_CONTROL, *OFF, *refused, *errors, NO_ERROR])
+async def test_why_it_has_no_effect_is_what_it_says(driver, controller) -> None:
+    controller.says["set machine on"] = b"SET MACHINE NAK\n\r"
+    said = [f"ERROR drive {n} is cold\r\n".encode() for n in (1, 2, 3, 4, 5, 5)]
+    controller.says["get error"] = lambda: (
+        said.pop(0) if said and controller.count("set machine on") else b"ERROR OK\r\n"
+    )
     with pytest.raises(CommandRefused) as caught:
         await driver.prepare(ALL)
     four = "drive 1 is cold; drive 2 is cold; drive 3 is cold; drive 4 is cold"
-    assert caught.value.problem == f"refuses 'set machine on': {four}; and 1 more"
-    without_nak = b"error: Cannot issue SET MODE command while SET MDI command is still active\r\n"
-    why = said("get enable: ON | get error: OK")
-    driver = await play.opened([*UNTIL_MDI[:-2], ("set mode mdi", without_nak), *why])
-    with pytest.raises(CommandRefused, match="while SET MDI command is still active"):
+    assert caught.value.problem == f"refuses 'switch-on': 'machine on' has no effect: {four}; and 1 more"
+    assert controller.count("set machine on") == 1
+
+
+async def test_an_explanation_without_a_nak_is_a_refusal(driver, controller) -> None:
+    """As 2.10 says it while another client moves the machine."""
+    refusal = b"error: Cannot issue SET HOME command while SET MDI command is still active\r\n"
+    controller.says["set home"] = refusal
+    with pytest.raises(DeviceError, match=r"is not homed: Cannot issue .* still active"):
         await driver.prepare(ALL)
 
 
-async def test_a_stop_during_prepare_prevents_homing(play):
-    stopped = play.Pause()
-    held = [IN_JOINT_MODE[0], ("get teleop_enable", stopped, b"TELEOP_ENABLE NO\r\n"), NO_ERROR]
-    main = [*UNTIL_HOMED, *ON_NOT_HOMED, *OWN_COORDINATES, *held]
-    driver = await play.opened(main, play.STOPPING)
-    preparing = await stopped.reached_by(driver.prepare(ALL))
+async def test_a_homing_that_fails_or_is_stopped_is_reported(driver, machine, controller) -> None:
+    home = machine.home
+    machine.home = lambda: controller.state._errors.append("home switch of joint 2 not found")
+    controller.says["get joint_homed"] = b"JOINT_HOMED NO YES NO NO NO NO\r\n"
+    with pytest.raises(DeviceError, match="is not homed: home switch of joint 2 not found"):
+        await driver.prepare(ALL)
+    controller.state.homed = False
+    controller.says, machine.home = {}, lambda: (home(), machine._stop.wait())
+    preparing = asyncio.create_task(driver.prepare(ALL))
+    await until(lambda: controller.count("set home") == 2)
     await driver.stop()
-    stopped.set()
-    with pytest.raises(MotionInterrupted, match="was stopped before it was ready"):
+    with pytest.raises(MotionInterrupted):
         await preparing
 
 
-ESTOP_AT_START = [*IN_ESTOP, *NOT_HOMED]
-LATER_ESTOP = [*IN_ESTOP, *HOMED]
+async def test_it_homes_again_out_of_teleoperation(driver, controller) -> None:
+    await driver.prepare(ALL)
+    controller.state.mode, controller.state.teleop, controller.state.homed = (
+        controller.state.mode.MANUAL,
+        True,
+        False,
+    )
+    await driver.prepare(ALL)
+    assert controller.count("set teleop_enable off") == 1
+
+
+async def test_a_server_without_the_optional_queries_is_accepted(driver, controller) -> None:
+    for what in ("user_linear_units", "program_codes", "pos_offset", "feed_override", "teleop_enable"):
+        controller.says[f"get {what}"] = b"GET NAK\r\n"
+    await driver.prepare(ALL)
+    await driver.move(TARGET, MOVE_S)
 
 
 @pytest.mark.parametrize(
-    ("state", "needed", "problem"),
+    ("what", "said", "problem"),
     [
-        (ESTOP_AT_START, StartupAction.RESET_INITIAL_ESTOP, "is in emergency stop since it was started"),
-        (LATER_ESTOP, StartupAction.RESET_ESTOP, "is in emergency stop$"),
-        (OFF, StartupAction.SWITCH_ON, "is switched off"),
-        (ON_NOT_HOMED, StartupAction.HOME, "is not homed"),
+        ("user_linear_units", "INCH", "counts in inch, .*Set controller.unit_mm = 25.4"),
+        ("user_linear_units", "CUSTOM", r"counts in custom, .*Set \[TRAJ\] LINEAR_UNITS = mm"),
+        ("program_codes", "G0 G91 G49", r"takes coordinates as relative \(G91\). Send G90"),
+        ("program_codes", "G0 G90 G43", r"adds a tool length \(G43\). Send G49"),
+        ("pos_offset", "0 -5.0 0 0 0 0", r"adds an offset of 0 -5 .*Clear it"),
+        ("pos_offset", "0 garbled", "'0 garbled' where six positions belong"),
+        ("feed_override", "120", r"moves 120 % as fast as it is commanded \(feed override\)"),
+        ("feed_override", "50", ""),
+        ("feed_override", "strange", ""),
     ],
 )
-async def test_what_is_not_permitted_is_not_done(play, state, needed, problem):
-    """The script has no ``set estop off``, ``set machine on`` or ``set home``: sending one would fail."""
-    driver = await play.opened([*TAKING_CONTROL, *state])
+async def test_what_falsifies_coordinates_is_found_before_anything_moves(
+    driver, controller, what, said, problem
+) -> None:
+    controller.says[f"get {what}"] = f"{what.upper()} {said}\r\n".encode()
+    if not problem:
+        await driver.check()
+        await driver.prepare(ALL)
+        return
+    for look in (driver.check, lambda: driver.prepare(ALL)):
+        with pytest.raises(DeviceError, match=problem):
+            await look()
+    assert controller.count("set home") == 0
+    with pytest.raises(MoveRefused, match=r"its last preparation failed\. Prepare it again"):
+        await driver.move(TARGET, MOVE_S)
+
+
+@pytest.mark.parametrize(
+    ("change", "needed", "problem"),
+    [
+        (
+            lambda state: None,
+            StartupAction.RESET_INITIAL_ESTOP,
+            "is in emergency stop since it was started",
+        ),
+        (lambda state: setattr(state, "homed", True), StartupAction.RESET_ESTOP, "is in emergency stop$"),
+        (lambda state: state.set_estop(on=False), StartupAction.SWITCH_ON, "is switched off"),
+        (lambda state: None, StartupAction.HOME, "is not homed"),
+    ],
+)
+async def test_what_is_not_permitted_is_not_done(driver, controller, change, needed, problem) -> None:
+    change(controller.state)
     with pytest.raises(StartupNotPermitted, match=problem) as refusal:
         await driver.prepare(ALL - {needed})
     assert refusal.value.needed is needed
+    assert (await driver.status()).may_move is (needed is StartupAction.HOME)
 
 
-async def test_an_emergency_stop_that_returns_is_not_reset_again(play):
-    driver = await play.opened([*TAKING_CONTROL, *RESETTING, *ESTOP_AT_START])
-    with pytest.raises(StartupNotPermitted, match="is in emergency stop since it was started"):
+async def test_an_emergency_stop_that_returns_is_not_reset_again(driver, controller) -> None:
+    controller.says["set machine on"] = lambda: controller.state.set_estop(on=True)
+    with pytest.raises((StartupNotPermitted, CommandRefused)):
         await driver.prepare(ALL)
+    assert controller.count("set estop off") == 1
+
+
+def python(program: str) -> tuple[str, ...]:
+    return (sys.executable, "-c", program)
+
+
+async def test_reloading_runs_the_command_while_the_machine_is_off(make, machine, tmp_path) -> None:
+    ran = tmp_path / "ran"
+    driver = make(reload_command=python(f"open({str(ran)!r}, 'w').close()"))
+    await driver.open()
+    await driver.prepare(ALL)
+    machine.switch_on = lambda on=machine.switch_on: (on(), ran.rename(tmp_path / "seen"))
+    await driver.reload(RESTARTED)
+    assert (tmp_path / "seen").exists()
+    await driver.move(TARGET, MOVE_S)
+
+
+async def test_a_machine_that_does_not_go_off_is_not_reloaded(make, controller, tmp_path) -> None:
+    ran = tmp_path / "ran"
+    driver = make(reload_command=python(f"open({str(ran)!r}, 'w').close()"))
+    await driver.open()
+    await driver.prepare(ALL)
+    controller.says["set machine off"] = b"SET MACHINE ACK\n\r"
+    with pytest.raises(DeviceError, match="'machine off' has no effect"):
+        await driver.reload(RESTARTED)
+    assert not ran.exists()
+
+
+@pytest.mark.parametrize(
+    ("program", "problem"),
+    [
+        ("import sys; sys.exit('S1x: no such pin')", r"with status 1: S1x: no such pin"),
+        ("raise SystemExit(3)", r"failed with status 3\. Correct controller\.reload_command"),
+    ],
+)
+async def test_a_command_that_fails_leaves_the_machine_off(make, controller, program, problem) -> None:
+    driver = make(reload_command=python(program))
+    await driver.open()
+    await driver.prepare(ALL)
+    with pytest.raises(DeviceError, match=problem) as caught:
+        await driver.reload(RESTARTED)
+    assert "the machine is off" in str(caught.value)
+    assert not controller.state.enabled
+
+
+@pytest.mark.parametrize("includes_zeros", [True, False])
+async def test_a_joint_that_moved_is_an_error(make, machine, includes_zeros) -> None:
+    driver = make(joints_include_zeros=includes_zeros)
+    await driver.open()
+    await driver.prepare(ALL)
+    machine.switch_on = lambda: setattr(machine, "_joints", (0.0, 0.0, 0.0, 6.8, 0.0, 0.0))
+    if includes_zeros:  # it may report other joints where it stands
+        await driver.reload(RESTARTED)
+        return
+    with pytest.raises(DeviceError, match=r"moved joint 4 by 6\.800 mm while it read its config again"):
+        await driver.reload(RESTARTED)
+
+
+async def test_nothing_is_reset_or_switched_on_without_permission(make, ready, controller) -> None:
+    controller.state.set_machine(on=False)
+    with pytest.raises(StartupNotPermitted, match="is switched off"):
+        await ready.reload(RESTARTED)
+    await ready.prepare(ALL)
+    off = controller.state.set_machine
+    controller.says["set machine off"] = lambda: (off(on=False), controller.state.set_estop(on=True))[-1]
+    with pytest.raises(StartupNotPermitted, match=r"is in emergency stop$"):
+        await ready.reload(RESTARTED)
+    controller.state.set_estop(on=False)
+    with pytest.raises(StartupNotPermitted, match="is switched off"):
+        await ready.prepare(RESTARTED)
+
+
+async def test_a_command_that_restarts_the_controller_is_waited_for(make, controller, tmp_path) -> None:
+    mark = tmp_path / "restarting"
+    driver = make(reload_command=("touch", str(mark)))
+    await driver.open()
+    await driver.prepare(ALL)
+    state, refusals = controller.state, [Then.HANG_UP, Then.HANG_UP]
+
+    def greets() -> Then | None:
+        if not refusals:
+            return None
+        state.set_estop(on=True)
+        state.homed = False
+        return refusals.pop()
+
+    controller.says["hello EMC"] = lambda: greets() if mark.exists() else None
+    with pytest.raises(StartupNotPermitted, match="since it was started"):
+        await driver.reload(frozenset({StartupAction.HOME}))
+    await driver.prepare(ALL)
+    refusals.append(Then.HANG_UP)
+    await driver.reload(RESTARTED)
+    await driver.move(TARGET, MOVE_S)
+    controller.says["hello EMC"] = lambda: Then.HANG_UP
+    with pytest.raises(ConnectionLost, match="closed the connection"):
+        await driver.reload(RESTARTED)
+
+
+async def test_a_reload_command_that_cannot_be_run_is_reported(tmp_path):
+    absent = str(tmp_path / "absent")
+    with pytest.raises(DeviceError, match="absent' cannot be run: No such file or directory"):
+        await run_reload_command((absent,), "controller", 5.0)
+
+
+async def test_a_program_installed_beside_this_one_is_found_without_a_path_to_it(monkeypatch):
+    monkeypatch.setenv("PATH", os.defpath)
+    assert shutil.which("hexacell-set-pins") is None
+    with pytest.raises(DeviceError, match="no HAL file is named"):
+        await run_reload_command(("hexacell-set-pins",), "controller", 60.0)
+
+
+async def test_a_reload_command_that_exceeds_its_time_or_is_cancelled_is_killed(tmp_path):
+    with pytest.raises(DeviceError, match=r"took longer than 0\.3 s"):
+        await run_reload_command(_saying_who(tmp_path), "controller", 0.3)
+    if (tmp_path / "pid").exists():  # else it was killed before it could say
+        _expect_gone(tmp_path)
+        (tmp_path / "pid").unlink()
+    running = asyncio.create_task(run_reload_command(_saying_who(tmp_path), "controller", 1800.0))
+    await until((tmp_path / "pid").exists)
+    await cancel(running)
+    _expect_gone(tmp_path)
+
+
+async def test_a_daemon_that_it_starts_is_not_waited_for(tmp_path):
+    await run_reload_command(("sh", "-c", f"sleep 3600 & echo $! > {tmp_path}/pid"), "controller", 1800.0)
+    os.kill(int((tmp_path / "pid").read_text()), signal.SIGKILL)
+
+
+def _saying_who(folder):
+    return ("sh", "-c", f"echo $$ > {folder}/new; mv {folder}/new {folder}/pid; exec sleep 3600")
+
+
+def _expect_gone(folder):
+    with pytest.raises(ProcessLookupError):
+        os.kill(int((folder / "pid").read_text()), 0)

@@ -7,8 +7,9 @@ from dataclasses import astuple
 
 import pytest
 
+from drivers.controllers.adapter.link import Timeouts
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
-from drivers.controllers.linuxcnc.protocol import Timeouts
+from drivers.controllers.linuxcnc.shell_protocol import Limits
 from drivers.simulated.linuxcnc.server import HOST, SimulatedController
 from drivers.simulated.linuxcnc.state import MotionRefused
 from hexacell.cell.robot import ControllerSettings
@@ -17,7 +18,7 @@ from hexacell.errors import FileError
 from hexacell.kinematics.pose import Pose
 from tests.waiting import wait_until
 
-QUICK = Timeouts(poll=0.005, arrival=0.05, switch=0.05)
+QUICK, HASTY = Timeouts(poll=0.005, arrival=0.05), Limits(arrival=0.05)
 
 
 class FakeMachine:
@@ -178,8 +179,10 @@ def ready(client: Callable[[], RawClient]) -> RawClient:
 def driver(simulated: SimulatedController) -> Callable[..., LinuxcncrshController]:
     """Makes drivers for ``simulated``; keywords are controller settings."""
 
-    def make(timeouts: Timeouts = QUICK, **settings: object) -> LinuxcncrshController:
+    def make(limits: Limits = HASTY, **settings: object) -> LinuxcncrshController:
         values = {"config": "machine.ini", "port": simulated.port, **settings}
-        return LinuxcncrshController(ControllerSettings.model_validate(values), timeouts=timeouts)
+        return LinuxcncrshController(
+            ControllerSettings.model_validate(values), timeouts=QUICK, limits=limits
+        )
 
     return make

@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from drivers.controllers.linuxcnc.protocol import Timeouts
+from drivers.controllers.linuxcnc.shell_protocol import Limits
 from drivers.errors import MotionInterrupted, MoveRefused, PoseRefused
 from drivers.interfaces import StartupAction
 from hexacell.errors import DeviceError
@@ -47,7 +47,7 @@ async def test_an_unreachable_pose_while_another_client_waits_for_no_completion(
 
 
 async def test_a_frozen_controller_and_one_that_was_ended_are_told_apart(driver, simulated) -> None:
-    hasty = driver(Timeouts(connect=10.0, answer=0.3, stop=10.0))
+    hasty = driver(Limits(answer=0.3, quick=0.3, stop=0.3))
     await hasty.open()
     await hasty.prepare(ALL)
     before = await hasty.status()

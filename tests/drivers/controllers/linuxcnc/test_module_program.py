@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from drivers.controllers.adapter.served_robot import FailedError
-from drivers.controllers.linuxcnc_module import program, status
-from tests.drivers.controllers.linuxcnc_module.fake_linuxcnc import FakeLinuxcnc
+from drivers.controllers.linuxcnc import machine as orders
+from drivers.controllers.linuxcnc import module_program as program
+from tests.drivers.controllers.linuxcnc.fake_linuxcnc import FakeLinuxcnc
 
 INCH = 1.0 / 25.4
 THERE, BACK = (10.0, -20.0, 560.0, 5.0, -4.0, 10.0), (0.0, 0.0, 550.0, 0.0, 0.0, 0.0)
@@ -32,20 +33,19 @@ def task(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[subprocess
 def fake(task: object, monkeypatch: pytest.MonkeyPatch) -> FakeLinuxcnc:
     """LinuxCNC's module of a machine that counts in inches; the program ends by ``SystemExit``."""
     made = FakeLinuxcnc(INCH)
-    for module in (program, status):
-        monkeypatch.setattr(module, "linuxcnc", made)
+    monkeypatch.setattr(program, "linuxcnc", made)
     monkeypatch.setattr(os, "_exit", lambda status: (_ for _ in ()).throw(SystemExit(status)))
     return made
 
 
 @pytest.fixture
-def machine(fake: FakeLinuxcnc) -> program.Machine:
-    made = program.Machine()
+def machine(fake: FakeLinuxcnc) -> orders.Machine:
+    made = orders.Machine(program.ModuleAccess())
     assert made.hello({}) == {"name": "LinuxCNC 2.9", "description": "hexa.ini"}
     return made
 
 
-def moved(machine: program.Machine, pose: tuple[float, ...]) -> None:
+def moved(machine: orders.Machine, pose: tuple[float, ...]) -> None:
     machine.move(pose, 1.0, lambda at: None)
 
 
@@ -69,7 +69,7 @@ def test_modes_that_could_not_be_restored_are_restored_after_the_next_move(fake,
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"g92_offset": (0.0, 0.0, 0.1, *[0.0] * 6)}, "an offset of Z0.1 to"),
+        ({"g92_offset": (0.0, 0.0, 0.1, *[0.0] * 6)}, "an offset of 0 0 0.1 0"),
         ({"gcodes": (0, 910)}, "relative"),
         ({"tool_offset": (0.0, 0.0, 1.0, *[0.0] * 6)}, "tool length"),
         ({"feedrate": 1.2}, "moves 120 % as fast"),
@@ -102,7 +102,7 @@ def test_a_program_that_somebody_runs_takes_it_away(fake, machine) -> None:
 def test_messages_without_end_are_a_few(fake, machine) -> None:
     fake.now.task_state = fake.STATE_OFF
     fake.flood("joint 3 following error")
-    assert machine.status()["errors"] == ["joint 3 following error"] * program.MOST_SHOWN
+    assert machine.status()["errors"] == ["joint 3 following error"] * orders.MOST_SHOWN
     fake.now.task_state = fake.STATE_ON
     fake.breaks_off = fake.MODE_MDI
     with pytest.raises(FailedError, match=r"^joint 3 following error$"):
@@ -129,5 +129,5 @@ def test_without_linuxcnc_it_ends_and_says_so(fake, machine, task, capsys, end) 
 def test_without_the_module_it_says_which_python_is_needed(monkeypatch) -> None:
     monkeypatch.setattr(program, "linuxcnc", None)
     with pytest.raises(FailedError, match="no module linuxcnc") as caught:
-        program.Machine().hello({})
+        orders.Machine(program.ModuleAccess()).hello({})
     assert "controller.options.python" in caught.value.answer["action"]

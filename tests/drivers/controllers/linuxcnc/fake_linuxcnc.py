@@ -93,6 +93,7 @@ class FakeLinuxcnc(SimpleNamespace):
 
         made.mode = given(lambda mode: setattr(self.now, "task_mode", mode))
         made.mdi, made.abort = given(self._execute), given(lambda: None)
+        made.state = made.home = made.teleop_enable = given(lambda _value: None)
         return made
 
     def _execute(self, block: str) -> None:

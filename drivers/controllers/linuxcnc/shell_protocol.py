@@ -1,4 +1,4 @@
-"""The linuxcncrsh protocol: time-outs, commands and responses, without a connection.
+"""The linuxcncrsh protocol: time limits, commands and responses, without a connection.
 
 A client sends ``get <what>`` or ``set <what> <value>``, one line each. ``get`` answers
 ``<WHAT> <words>``, ``set`` answers ``SET <WHAT> ACK`` once verbose is on, and both answer ``NAK``
@@ -7,12 +7,10 @@ adds a blank line after some refusals; 2.10 ends all with CR LF and explains a r
 ``error: ...`` lines before the NAK. (linuxcncrsh(1), and a wire trace of 2.9.)
 """
 
-import asyncio
 import math
 from dataclasses import dataclass
 
-from hexacell.cell.robot import ControllerSettings
-from hexacell.errors import UsageError
+from drivers.controllers.adapter.served_robot import FailedError
 from hexacell.kinematics.parameters import LEGS
 
 MAX_LINE_BYTES = 255
@@ -22,39 +20,31 @@ _EXPLANATION = "error:"
 _RESPONSE_NAME = {"SET_WAIT": "WAIT_MODE"}
 
 
-def subject_of(settings: ControllerSettings) -> str:
-    """The subject of error messages; raises ``UsageError`` if the cell file names no port."""
-    if settings.port is None:
-        raise UsageError("the cell file names no controller port", action="Set controller.port")
-    return f"controller {settings.host}:{settings.port}"
-
-
 @dataclass(frozen=True, slots=True)
-class Timeouts:
-    """Longest waits, s of real time. A move may take twice its duration and ``beyond_move``.
+class Limits:
+    """Longest waits, s of real time.
 
-    Measured on LinuxCNC 2.9: a query is answered in 1 ms, switching takes at most 0.4 s, an
-    abort 0.6 s; a refusal of 2.10 comes together with its explanation. On a computer with five times the
-    load that it can carry, a change of state was acknowledged after 5.3 s (``command``), or without effect.
+    Measured on LinuxCNC 2.9: a query is answered in 1 ms, switching takes at most 0.4 s, an abort 0.6 s; a
+    refusal of 2.10 comes together with its explanation. On a computer with five times the load that it can
+    carry, a change of state was acknowledged after 5.3 s.
+
+    Attributes:
+        connect: to be connected.
+        answer: for the answer to a query, and ``command`` for that to a command that moves nothing.
+        explanation: for what follows an explanation.
+        arrival: for a motion to go on, once its end was acknowledged elsewhere.
+        quick: for each answer to a stop over a connection that is there, and ``stop`` over another one.
+        rest: for a machine to be at rest after it was told to stop.
     """
 
     connect: float = 3.0
     answer: float = 5.0
     command: float = 20.0
     explanation: float = 0.3
-    poll: float = 0.05
     arrival: float = 1.0
-    stop: float = 5.0
-    switch: float = 5.0
-    reload: float = 120.0
-    reconnect: float = 60.0
-    beyond_move: float = 10.0
-    restore: float = 1.0
-
-
-def loop_time() -> float:
-    """The time of the running event loop, s."""
-    return asyncio.get_running_loop().time()
+    quick: float = 0.3
+    stop: float = 1.25
+    rest: float = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,18 +77,18 @@ class LineBuffer:
         return self._rest.decode("utf-8", "replace").strip()
 
 
-def encode_command(command: str, subject: str) -> bytes:
+def encode_command(command: str) -> bytes:
     """The bytes of one command line.
 
     Raises:
-        UsageError: It is longer than the server's buffer, or is more than one line.
+        FailedError: It is longer than the server's buffer, or is more than one line.
     """
     line = command.encode() + b"\r\n"
     if len(line) > MAX_LINE_BYTES:
         problem = f"a command of {len(line)} bytes is longer than the {MAX_LINE_BYTES} it can take"
-        raise UsageError(problem, subject=subject)
+        raise FailedError("fault", problem)
     if b"\r" in line[:-2] or b"\n" in line[:-2]:
-        raise UsageError("a command must be a single line", subject=subject)
+        raise FailedError("fault", "a command must be a single line")
     return line
 
 
@@ -127,14 +117,14 @@ def parse_positions(text: str) -> tuple[float, float, float, float, float, float
     """The first six numbers of an answer: joints 1 to 6, mm, or a pose's coordinates.
 
     Raises:
-        ValueError: There are fewer than six, or one of them is no finite number.
+        FailedError: There are fewer than six, or one of them is no finite number.
     """
     try:
         x, y, z, a, b, c = (float(word) + 0.0 for word in text.split()[:LEGS])  # -0.0 becomes 0.0
     except ValueError as error:
-        raise ValueError(f"it reports {text!r} where six positions belong") from error
+        raise FailedError("fault", f"it reports {text!r} where six positions belong") from error
     if not all(math.isfinite(value) for value in (x, y, z, a, b, c)):
-        raise ValueError(f"it reports {text!r}, which is no position")
+        raise FailedError("fault", f"it reports {text!r}, which is no position")
     return x, y, z, a, b, c
 
 

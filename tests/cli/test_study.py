@@ -2,7 +2,6 @@
 
 import json
 import signal
-import sys
 from pathlib import Path
 
 import pytest
@@ -63,14 +62,3 @@ def test_what_is_no_study_is_not_overwritten(typed_here, tmp_path: Path) -> None
 def test_a_number_of_draws_is_above_zero(typed_here) -> None:
     refused = typed_here("study", "paper", "--draws", "0")
     assert (refused.code, "--draws" in refused.err) == (ExitCode.USAGE, True)
-
-
-def test_a_study_has_processes_or_a_cluster_and_dask_may_be_absent(typed_here, monkeypatch) -> None:
-    monkeypatch.setitem(sys.modules, "hexacell.study.dask_cluster", None)
-    on_cluster = (*PAPER[:4], "--scheduler", "tcp://127.0.0.1:1")
-    for arguments, words in (
-        ((*on_cluster, "--processes", "2"), "not allowed with argument --scheduler"),
-        (on_cluster, "Dask is not installed. Install hexacell[dask]"),
-    ):
-        refused = typed_here(*arguments)
-        assert (refused.code, words in refused.err) == (ExitCode.USAGE, True), refused.err

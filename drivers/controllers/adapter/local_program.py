@@ -3,6 +3,7 @@
 import asyncio
 import socket
 import threading
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Protocol, Self
 
@@ -55,18 +56,39 @@ class LocalProgram:
         self._robot.close()
 
     def _serve(self, connection: socket.socket) -> None:
-        def ends(error: Exception) -> bool:
-            if is_lost := isinstance(error, ConnectionLost):
-                self._lost = self._lost or error
-                with suppress(OSError):
-                    connection.shutdown(socket.SHUT_RDWR)
-            return is_lost
+        def lose(error: ConnectionLost) -> None:
+            self._lost = self._lost or error
 
-        with (
-            suppress(HexacellError, OSError),
-            connection,
-            connection.makefile() as lines,
-            connection.makefile("w") as answers,
-        ):
-            serve(self._robot, lines, answers, ends)
+        serve_over(connection, self._robot, lose)
         self._robot.close()
+
+
+def serve_over(
+    connection: socket.socket,
+    robot: Robot,
+    lose: Callable[[ConnectionLost], None] = lambda _error: None,
+    hears: Callable[[], bool] = lambda: True,
+) -> None:
+    """Serve a robot over a connection until that ends, or the one to its controller is lost.
+
+    Args:
+        connection: to the client; it is closed.
+        robot: which raises ``ConnectionLost`` where its controller is gone.
+        lose: told of that.
+        hears: whether a line is taken; others are lost.
+    """
+
+    def ends(error: Exception) -> bool:
+        if is_lost := isinstance(error, ConnectionLost):
+            lose(error)
+            with suppress(OSError):
+                connection.shutdown(socket.SHUT_RDWR)
+        return is_lost
+
+    with (
+        suppress(HexacellError, OSError),
+        connection,
+        connection.makefile() as lines,
+        connection.makefile("w") as answers,
+    ):
+        serve(robot, (line for line in lines if hears()), answers, ends)

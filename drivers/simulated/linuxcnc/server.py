@@ -34,7 +34,7 @@ class _Handler(socketserver.BaseRequestHandler):
         client = _Client(self.server, self.request.sendall)
         with suppress(OSError, ConnectionCut):
             while data := self.request.recv(_CHUNK):
-                if not self.server.is_silent:
+                if self.server.hears():
                     client.receive(data)
 
 
@@ -66,6 +66,10 @@ class SimulatedController(socketserver.ThreadingTCPServer):
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def hears(self) -> bool:
+        """Whether a client is heard."""
+        return not self.is_silent
 
     def set_unplugged(self, *, on: bool) -> None:
         """Cut every connection and accept no other, or accept them again; the machine continues."""

@@ -121,11 +121,8 @@ def _studies(commands: Commands) -> None:
         study = studies.add(name, summary, "study.main")
         study.set_defaults(study=name)
         add_value(study, "--draws", "N", drawn, whole_number(1), 20)
-        workers = study.add_mutually_exclusive_group()
         words = "at a time (default: one for each processor)"
-        add_value(workers, "--processes", "N", words, whole_number(1))
-        words = "of a Dask cluster, tcp://HOST:PORT, instead of processes"
-        add_value(workers, "--scheduler", "ADDRESS", words)
+        add_value(study, "--processes", "N", words, whole_number(1))
         words = "keeps each result, so that a study can be interrupted, and gets a picture"
         add_value(study, "--folder", "FOLDER", words, Path, Path("hexacell-study"))
         study.add_json()

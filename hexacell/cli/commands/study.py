@@ -13,13 +13,13 @@ from pydantic_core import to_jsonable_python
 
 from hexacell.cli.console import Console
 from hexacell.cli.progress import task_bar
-from hexacell.errors import ExitCode, UsageError
+from hexacell.errors import ExitCode
 from hexacell.storage.output_files import PICTURE, PICTURE_MARK, OutputFile
 from hexacell.study import paper_experiment as experiment
 from hexacell.study import paper_simulation as simulation
 from hexacell.study.design_records import PAPER_DEG, RANDOM_DEG, OrientationChoice
 from hexacell.study.design_study import DESIGN, DesignStudy, Spread
-from hexacell.study.tasks import NewExecutor, Study, processes, run_study
+from hexacell.study.tasks import Study, processes, run_study
 from hexacell.text import paper_study
 from hexacell.text.layout import wrapped
 from hexacell.text.svg_drawing import AFTER, BEFORE, INK, as_svg, columns, new_figure, plain_ticks
@@ -163,7 +163,7 @@ STUDIES: Mapping[str, ShownStudy] = {row.study.name: row for row in _ROWS}
 
 def main(options: argparse.Namespace, console: Console) -> ExitCode:
     """One of the studies; its picture goes into the folder of its results."""
-    shown, new_executor = STUDIES[options.study], _executors(options)
+    shown, new_executor = STUDIES[options.study], processes(options.processes)
     picture = OutputFile(options.folder / f"{shown.study.name}.svg", PICTURE)
     picture.require()
     with task_bar(shown.study.unit) as progress:
@@ -176,11 +176,3 @@ def main(options: argparse.Namespace, console: Console) -> ExitCode:
     return ExitCode.DONE
 
 
-def _executors(options: argparse.Namespace) -> NewExecutor:
-    if options.scheduler is None:
-        return processes(options.processes)
-    try:
-        from hexacell.study.dask_cluster import dask_cluster  # noqa: PLC0415 - an extra
-    except ImportError as error:
-        raise UsageError("Dask is not installed", action="Install hexacell[dask]") from error
-    return dask_cluster(options.scheduler)

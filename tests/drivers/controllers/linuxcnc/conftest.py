@@ -67,8 +67,7 @@ class _Handler(server._Handler):
         client = _Client(self.server, self.request.sendall)
         with suppress(OSError, ConnectionCut):
             while data := self.request.recv(4096):
-                if not self.server.is_silent:
-                    client.receive(data)
+                client.receive(data)
 
 
 class AlteredController(server.SimulatedController):

@@ -172,20 +172,22 @@ class Link:
         problem: str,
         kind: type[ConnectionLost] = ConnectionLost,
         action: str | None = "Look at the program's own messages in the log",
+        *,
+        is_closed: bool = False,
     ) -> None:
         """Break the link: the program's stdin or its connection ends, at which it stops the robot."""
         self._writer.close()
         if self._error is not None:
             return
         self._error = kind(self._masked(problem), subject=self._program.name, action=action)
-        _log.warning("%s", self._error)
+        _log.log(logging.DEBUG if is_closed else logging.WARNING, "%s", self._error)
         for request in self._pending.values():
             if not request.answer.done():
                 request.answer.set_result(None)
 
     async def close(self) -> None:
         """End it; a program that does not end in time is killed. Closing twice is harmless."""
-        self.fail("was closed")
+        self.fail("was closed", is_closed=True)
         if self._process is not None:
             await self._process.close(self._timeouts.closing)
         else:

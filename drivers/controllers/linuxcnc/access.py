@@ -89,6 +89,9 @@ class Access(Protocol):
     def connect(self, told: Told) -> Told:
         """Connect; its name and description. Nothing moves."""
 
+    def claim(self) -> None:
+        """Take control, where one client has it, from another that took it since."""
+
     def state(self) -> State:
         """Its state now."""
 

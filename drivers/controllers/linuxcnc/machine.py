@@ -75,8 +75,9 @@ class Machine:
         return {"pose": list(state.pose), "joints": list(state.joints)}
 
     def start_up(self, action: str) -> None:
-        """Do it, and wait until it is so; ``check`` looks whether coordinates are its own."""
+        """Do it, and wait until it is so; ``check`` takes control, and requires its own coordinates."""
         if action == "check":
+            self._access.claim()
             require_own_coordinates(self._access.state())
             return
         self._stopped.clear()

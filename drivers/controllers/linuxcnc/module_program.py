@@ -113,6 +113,9 @@ class ModuleAccess:
         }
         return {"name": f"LinuxCNC {linuxcnc.version}", "description": Path(stat.ini_filename).name}
 
+    def claim(self) -> None:
+        """All clients of the module may command."""
+
     def state(self) -> ModuleState:
         """Its state; without LinuxCNC this program ends, and says so."""
         return ModuleState(self._polled())

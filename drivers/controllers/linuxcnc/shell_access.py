@@ -62,6 +62,11 @@ class ShellAccess:
         description = PurePath(self.ask_if_known("inifile")).name
         return {"name": commands.server, "description": description}
 
+    def claim(self) -> None:
+        """Take control, whoever has it."""
+        self._is_in_control = False
+        self._own()
+
     def close(self) -> None:
         """Close both connections; whoever waits for one fails."""
         for connection in (self._commands, self._queries):

@@ -174,5 +174,3 @@ def main(options: argparse.Namespace, console: Console) -> ExitCode:
     console.print(f"\nThe same as a picture: {picture.path}")
     console.document(shown.document(found))
     return ExitCode.DONE
-
-

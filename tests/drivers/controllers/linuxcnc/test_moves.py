@@ -107,6 +107,9 @@ async def test_control_is_not_retaken_from_another_client(ready, make, controlle
             await ready.move(TARGET, MOVE_S)
     assert controller.count("set enable") == before
     await ready.prepare(ALL)
+    controller.state.commander = object()
+    await ready.prepare(ALL)
+    await ready.move(TARGET, MOVE_S)
 
 
 async def test_a_move_that_exceeds_its_time_is_stopped(ready, machine) -> None:

@@ -149,12 +149,15 @@ class ModuleAccess:
     def messages(self) -> list[str]:
         """Its error messages; what it only tells is none."""
         found = []
-        for _ in range(MOST_MESSAGES):
-            if (message := self._errors.poll()) is None:
-                break
-            kind, text = message
-            if kind in {linuxcnc.NML_ERROR, linuxcnc.OPERATOR_ERROR}:
-                found.append(text)
+        try:
+            for _ in range(MOST_MESSAGES):
+                if (message := self._errors.poll()) is None:
+                    break
+                kind, text = message
+                if kind in {linuxcnc.NML_ERROR, linuxcnc.OPERATOR_ERROR}:
+                    found.append(text)
+        except linuxcnc.error as error:
+            _end(f"LinuxCNC does not answer: {error}")
         return found
 
     def _polled(self) -> Any:  # noqa: ANN401
@@ -200,5 +203,15 @@ def _end(problem: str) -> None:
     os._exit(1)
 
 
+def main() -> None:
+    """Serve on stdin and stdout until they end; what LinuxCNC's library prints goes to stderr."""
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "w")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    machine = Machine(ModuleAccess())
+    serve(machine, answers=answers)
+    # Not by the ends of its channels: of a LinuxCNC that was restarted they remove what the new one uses.
+    os._exit(0)
+
+
 if __name__ == "__main__":
-    serve(Machine(ModuleAccess()))
+    main()

@@ -24,7 +24,7 @@ GAUGES = 3
 
 WHAT_TO_PRESS = (
     "x excludes the chosen pose or point in the cell file; on a line with OUT it removes the exclusion. "
-    "v tries the plan again, Escape goes back."
+    "v tries the plan again on simulated robots, some seconds. Escape goes back."
 )
 
 

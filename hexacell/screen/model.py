@@ -170,7 +170,7 @@ class ScreenModel:
                     is_running=self._is_running,
                 )
             case _:
-                return banner.history_banner(None if self.runs is None else len(self.runs))
+                return banner.history_banner(self.runs)
 
     def shown(self, screen: str) -> dict[str, tuple[Any, ...]]:
         """What the parts of a screen show now, by their names: what each ``show`` is called with."""

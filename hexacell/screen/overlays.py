@@ -161,7 +161,8 @@ class QuestionOverlay(AnswerOverlay[None]):
             await self.run_action("app.perform('abort')")
 
     def draw(self, model: ScreenModel) -> None:
-        """Show the gauges as they are now."""
+        """Show the gauges as they are now, and the time left, which the question may hide."""
+        self.query_one("#question").border_subtitle = model.banner("measure").rest.partition(".")[0]
         if self.view.beside is views.Beside.PLACING:
             self.query_one(PlacingPanel).show(model.devices.placing())
         elif self.view.beside is views.Beside.GAUGES:

@@ -158,16 +158,20 @@ class HistoryScreen(TabScreen):
         with Horizontal(id="sides"):
             yield titled(widgets.ChoiceTable(RUN_COLUMNS, id="runs"), "Runs, the latest first")
             yield PlotPanel(id="trend")
-        yield titled(widgets.TextList(id="comparison"), "Answer")
+        yield titled(widgets.TextList(id="comparison"), "Comparison (v), drift (o), changes")
 
     def draw(self, model: ScreenModel, has_effect: Callable[[str], bool]) -> None:
         """Show what is so now."""
         self.is_asked = model.question() is not None
-        proposing = {one.name for one in model.runs or () if one.summary.has_proposal}
+        runs = {one.name: one.summary for one in model.runs or ()}
 
         def has_effect_here(action: str) -> bool:
-            may_write = self.is_asked or self.query_one(widgets.ChoiceTable).chosen in proposing
-            return has_effect(action) and (may_write or action != "write")
+            chosen = runs.get(self.query_one(widgets.ChoiceTable).chosen or "")
+            may = {
+                "write": self.is_asked or (chosen is not None and chosen.has_proposal),
+                "about('roll back')": chosen is not None and chosen.has_written,
+            }
+            return has_effect(action) and may.get(action, True)
 
         super().draw(model, has_effect_here)
 

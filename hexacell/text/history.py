@@ -79,15 +79,16 @@ def comparison_sentence(compared: RunComparison) -> str:
 
 
 def drift_text(found: Sequence[ParameterTrend]) -> str:
-    """A line a parameter: first and last value, change in 30 days, and whether it walks."""
+    """A line a parameter: first and last value, change in 30 days, and whether it drifts."""
     if not found:
         return NO_DRIFT
     walking = [one.name for one in found if one.is_walking]
-    verdict = f"Walking: {', '.join(walking)}." if walking else "No parameter walks."
-    lines = [wrapped(verdict), f"{'':5}{'first':>15}{'last':>15}{'in 30 days':>14}{'sigma':>10}"]
+    verdict = f"Drifting: {', '.join(walking)}." if walking else "No parameter drifts."
+    said = wrapped(f"{verdict} In mm or deg; sigma is one standard deviation.")
+    lines = [said, f"{'':5}{'first':>15}{'last':>15}{'in 30 days':>14}{'sigma':>10}"]
     for one in found:
         change, sigma = TREND_DAYS * one.per_day, TREND_DAYS * one.sigma_per_day
-        mark = "  walking" if one.is_walking else ""
+        mark = "  drifts" if one.is_walking else ""
         values = f"{one.values[0]:15.4f}{one.values[-1]:15.4f}"
         lines.append(f"{one.name:5}{values}{change:+14.4f}{sigma:10.4f}{mark}")
     return "\n".join(lines)

@@ -205,4 +205,4 @@ def low_disk_space(folder: Path, limit_mb: float) -> Trip | None:
     if free_mb >= limit_mb:
         return None
     problem = f"only {free_mb:.0f} MB are free where the run is kept, less than {limit_mb:g} MB"
-    return Trip(Guard.DISK, str(folder), problem, "Free some space, then resume")
+    return Trip(Guard.DISK, str(folder), problem, "Delete files there that nobody needs, then resume")

@@ -45,7 +45,7 @@ def test_two_runs_and_the_drift(cell, typed_here) -> None:
     drift = typed_here("history", cell.path, "--drift", "--json").document
     assert len(drift["parameters"]) == 35
     json.dumps(drift, allow_nan=False)
-    assert typed_here("history", cell.path, "--drift").out.startswith("No parameter walks.")
+    assert typed_here("history", cell.path, "--drift").out.startswith("No parameter drifts.")
 
 
 def test_a_run_is_told_in_lines(cell, typed_here) -> None:

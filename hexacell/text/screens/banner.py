@@ -6,6 +6,7 @@ from hexacell.cell.model import CellSettings
 from hexacell.errors import ExitCode
 from hexacell.run_process.live_snapshot import LiveSnapshot
 from hexacell.run_process.messages import HostFailed
+from hexacell.services.history.run_index import PastRun
 from hexacell.text.layout import error_with_u
 from hexacell.text.screens.measuring import remaining
 from hexacell.text.screens.questions import question_view
@@ -22,6 +23,7 @@ from procedures.steps.move import Move
 from procedures.steps.place import Place
 
 NO_RUN = Banner("NO RUN", "Press 2, look at everything, and start one with s", rest="Nothing moves.")
+NOTHING_MOVES = "Nothing moves before a run is started."
 RESUMING = "Press 2, then r resumes it: nothing is lost"
 STARTING = Banner("STARTING", "Nothing to do: a process of its own connects to the devices")
 AFTER_COMPUTING = {
@@ -176,9 +178,10 @@ def cell_banner(live: LiveSnapshot | None, problem: str) -> Banner:
     if live.stop_reason:
         found.append(f"stop line: {live.stop_reason}")
     if found:
-        more = f"{len(found) - 1} more below." if len(found) > 1 else ""
-        return Banner("MEND THIS", _capital(found[0]), more, "Nothing moves.", Urgency.ALARM)
-    return Banner("READY", "Press 2 to look at everything before the robot moves", rest="Nothing moves.")
+        more = f"{len(found) - 1} more below. " if len(found) > 1 else ""
+        follows = f"{more}No key: it shows here by itself once it is mended."
+        return Banner("MEND THIS", _capital(found[0]), follows, NOTHING_MOVES, Urgency.ALARM)
+    return Banner("READY", "Press 2 to look at everything before the robot moves", rest=NOTHING_MOVES)
 
 
 def preflight_banner(
@@ -201,17 +204,18 @@ def preflight_banner(
     return Banner("READY", "Press s to start the calibration", following, rest, Urgency.GOOD)
 
 
-def history_banner(runs: int | None) -> Banner:
-    """What to do with the past runs of a cell, by their number; None while they are read."""
+def history_banner(runs: Sequence[PastRun] | None) -> Banner:
+    """What to do with the past runs of a cell, the latest first; None while they are read."""
     if runs is None:
         return Banner("READING", "Nothing to do: the runs of this cell are being read")
     if not runs:
         return Banner("NO RUNS", "Press 2, look at everything, and start one with s")
-    return Banner(
-        "HISTORY",
-        "Choose a run: Enter shows it again",
-        "b goes back to the config that it wrote; for the run in the controller, to the one before.",
-    )
+    latest = runs[0].summary.verdict
+    action, urgency = "Nothing to do: choose a run, Enter shows it again", Urgency.CALM
+    if latest not in {None, Verdict.PASS}:
+        action, urgency = f"Recalibrate with 2 and s: the latest run is a {latest}", Urgency.ATTENTION
+    follows = "b restores the config that a run wrote, or the one before it, and asks first."
+    return Banner("HISTORY", action, follows, NOTHING_MOVES, urgency)
 
 
 def _capital(text: str) -> str:

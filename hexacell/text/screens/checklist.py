@@ -75,7 +75,7 @@ def summary(items: Sequence[ChecklistItem]) -> str:
 
 
 NOT_TRIED = "v in 2 Preflight tries the plan; then its poses are here."
-EVERYTHING = "Nothing to do, unless you exclude some: simulated; the robot is sent to poses near these."
+EVERYTHING = "Nothing moves here. A run will go near these poses; exclude those that it must not."
 
 
 def plan_note(planned: Sequence[VisitedPose], *, is_trying: bool) -> str:

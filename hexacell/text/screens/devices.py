@@ -43,7 +43,7 @@ def device_cards(live: LiveSnapshot | None, later_s: float) -> tuple[Card, ...]:
     """
     if live is None:
         return ()
-    stop = Card("stop line", "free", Urgency.GOOD, "may move")
+    stop = Card("stop line", "free", Urgency.GOOD, "motion is allowed")
     if live.stop_reason:
         stop = Card("stop line", "NO MOTION", Urgency.ALARM, "stopped", (live.stop_reason,))
     gauges = [_gauge_card(one, later_s) for one in live.gauges]
@@ -78,8 +78,8 @@ def _encoder_card(encoders: Shown[EncoderSample], later_s: float) -> Card:
     age = age_text(encoders.age_s, later_s)
     if encoders.problem or (sample := encoders.value) is None:
         return _without_value("encoders", "NO READING", encoders.problem, age)
-    numbered = [f"{number} {position:+9.3f}" for number, position in enumerate(sample.positions, start=1)]
-    lines = [f"{left}   {right}" for left, right in zip(numbered[:3], numbered[3:], strict=True)]
+    numbered = [f"{number} {position:+8.2f}" for number, position in enumerate(sample.positions, start=1)]
+    lines = [f"{left}  {right}" for left, right in zip(numbered[:3], numbered[3:], strict=True)]
     return Card("encoders", "ok", Urgency.GOOD, f"six positions, {sample.unit}", (*lines, age))
 
 
@@ -90,7 +90,7 @@ def _controller_card(controller: Shown[ControllerStatus], later_s: float) -> Car
     said = tuple(status.error_messages)
     if status.estop:
         return Card("controller", "EMERGENCY STOP", Urgency.ALARM, "emergency stop", (*said, age))
-    figure, urgency = ("on, may move", Urgency.GOOD) if status.enabled else ("off", Urgency.ATTENTION)
+    figure, urgency = ("switched on", Urgency.GOOD) if status.enabled else ("off", Urgency.ATTENTION)
     return Card("controller", "ok" if status.enabled else "off", urgency, figure, (*said, age))
 
 

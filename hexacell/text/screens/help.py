@@ -49,6 +49,6 @@ REPLAY_HELP = """\
 A recorded run: space plays or halts it, right and left step by one event, page down and page up by a \
 hundred, home and end go to its ends, + and - change the speed. Nothing moves."""
 
-KEYS_TITLE = "Keys, the same on every screen"
+KEYS_TITLE = "Keys of all screens"
 
 KEYS_NOTE = "Choose others in {path}, below [keys]. Everything is in the palette as well (ctrl+p)."

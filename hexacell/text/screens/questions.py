@@ -1,5 +1,6 @@
 """Text for the questions of a run, with the answers that they take."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 from hexacell.kinematics.pose import Pose
@@ -15,9 +16,9 @@ PERSON = "a person at the screen"
 """Who approves a change, as the journal has it."""
 
 RECOVERIES = {
-    "retry": "try the same again",
-    "measure-again": "go back to the reference and take this record again",
-    "redo-set": "discard this point and measure it again",
+    "retry": "try the same again (nothing was moved)",
+    "measure-again": "go back to the reference and take this record again (something moved)",
+    "redo-set": "discard this point and measure it again (a gauge was moved)",
     "abort": "end the run; it can be resumed",
 }
 
@@ -31,7 +32,7 @@ def question_view(
             return _placement(place, live)
         case questions.PendingChange(gates=gates, displacement=moved, improvement=improvement) as pending:
             gain = improvement_sentence(improvement)
-            lines = "\n".join(map(_gate_line, gates))
+            lines = "\n".join(_gate_lines(gates))
             facts = teaching_sentence(moved), gain, found_sentence(pending.found), lines
             title = "Write the new geometry into the controller's config?"
             view = _consenting(question, person, "write it", title)
@@ -134,10 +135,13 @@ def again_question(record: str) -> QuestionView:
     return yes_or_no(title, (AGAIN_FOLLOWS,), yes, ("no, keep it", None))
 
 
-def _gate_line(gate: AcceptanceGate) -> str:
-    if gate.passed or not gate.needs_person:
-        return f"{'ok' if gate.passed else 'NO'}  {gate.sentence}"
-    return f"?   {gate.sentence} This is for you to decide."
+def _gate_lines(gates: tuple[AcceptanceGate, ...]) -> Iterator[str]:
+    """What speaks against writing, and how many of the conditions for it are met."""
+    passed = sum(gate.passed for gate in gates)
+    yield f"ok  {passed} of {len(gates)} conditions for a write are met."
+    for gate in (one for one in gates if not one.passed):
+        decide = " Only you can know whether it is built so: measure it there, or decline."
+        yield f"?   {gate.sentence}{decide}" if gate.needs_person else f"NO  {gate.sentence}"
 
 
 def approval_refusal(gates: tuple[AcceptanceGate, ...]) -> str:

@@ -24,6 +24,7 @@ from procedures.steps.place import Place
 
 NO_RUN = Banner("NO RUN", "Press 2, look at everything, and start one with s", rest="Nothing moves.")
 NOTHING_MOVES = "Nothing moves before a run is started."
+ONCE_MENDED = "No key: it shows here by itself once it is mended."
 RESUMING = "Press 2, then r resumes it: nothing is lost"
 STARTING = Banner("STARTING", "Nothing to do: a process of its own connects to the devices")
 AFTER_COMPUTING = {
@@ -179,7 +180,7 @@ def cell_banner(live: LiveSnapshot | None, problem: str) -> Banner:
         found.append(f"stop line: {live.stop_reason}")
     if found:
         more = f"{len(found) - 1} more below. " if len(found) > 1 else ""
-        follows = f"{more}No key: it shows here by itself once it is mended."
+        follows = f"{more}{ONCE_MENDED}"
         return Banner("MEND THIS", _capital(found[0]), follows, NOTHING_MOVES, Urgency.ALARM)
     return Banner("READY", "Press 2 to look at everything before the robot moves", rest=NOTHING_MOVES)
 

@@ -16,11 +16,17 @@ PERSON = "a person at the screen"
 """Who approves a change, as the journal has it."""
 
 RECOVERIES = {
-    "retry": "try the same again (nothing was moved)",
-    "measure-again": "go back to the reference and take this record again (something moved)",
-    "redo-set": "discard this point and measure it again (a gauge was moved)",
+    "retry": "try the same again",
+    "measure-again": "go back to the reference and take this record again",
+    "redo-set": "discard this point and measure it again",
     "abort": "end the run; it can be resumed",
 }
+WHEN = {
+    "retry": " (nothing was moved)",
+    "measure-again": " (something moved)",
+    "redo-set": " (a gauge was moved)",
+}
+"""After what each of them is right."""
 
 
 def question_view(
@@ -48,7 +54,9 @@ def question_view(
             return replace(view, paragraphs=shown, urgency=Urgency.ALARM)
         case questions.StepFailure(problem=problem):
             choices = (
-                Choice(str(number), RECOVERIES.get(choice, choice), choice, typed=choice)
+                Choice(
+                    str(number), RECOVERIES.get(choice, choice) + WHEN.get(choice, ""), choice, typed=choice
+                )
                 for number, choice in enumerate(question.choices, start=1)
             )
             return QuestionView(

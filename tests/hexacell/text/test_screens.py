@@ -24,7 +24,7 @@ from hexacell.run_process.messages import (
     RunDescribed,
     StatusChanged,
 )
-from hexacell.text.screens.banner import cell_banner, preflight_banner, run_banner
+from hexacell.text.screens.banner import ONCE_MENDED, cell_banner, preflight_banner, run_banner
 from hexacell.text.screens.devices import device_cards, gauge_lines
 from hexacell.text.screens.measuring import fault_view, record_rows, remaining
 from hexacell.text.screens.placing import mounting_advice, placing
@@ -199,7 +199,7 @@ def test_a_gauge_without_a_reading_is_not_old() -> None:
 def test_what_is_to_be_mended_comes_before_everything_else() -> None:
     snapshot = LiveSnapshot(gauges=(gauge(problem="gauge x: silent"),), stop_reason="open")
     banner = cell_banner(snapshot, "")
-    assert (banner.action, banner.following) == ("Gauge x: silent", "1 more below.")
+    assert (banner.action, banner.following) == ("Gauge x: silent", f"1 more below. {ONCE_MENDED}")
     failed = ChecklistItem(Mark.FAILED, "gauge y", "it answers in inch", "Press the in/mm key")
     ready = ChecklistItem(Mark.DONE, "gauge x")
     checked = partial(preflight_banner, is_checked=True, is_checking=False, is_running=False)

@@ -103,7 +103,8 @@ class Machine:
         require_own_coordinates(state)
         if was_ours and state.mode != MDI:
             raise foreign_mode(state)
-        self._enter_mdi_mode()
+        if state.mode != MDI:
+            self._enter_mdi_mode()
         self._take_messages()
         self._restoring = self._restoring or gcode.restoring_block(state.codes)
         self._access.begin(gcode.timed_move(pose, duration_s))

@@ -86,6 +86,7 @@ class ShellAccess:
     def begin(self, block: str) -> None:
         """Have a block executed."""
         self._own().send(f"set mdi {block}")
+        self._forget()
         self._ended_s, self._is_refused = None, False
 
     def is_over(self, state: State, pose: Sequence[float] | None = None) -> bool:
@@ -133,6 +134,11 @@ class ShellAccess:
         if (response := self._asked(what)).accepted:
             return response.text
         raise FailedError("fault", f"it does not know 'get {what}'")
+
+    @cached_property
+    def units(self) -> str:
+        """Its unit of length; empty if the server does not know it."""
+        return self.ask_if_known("user_linear_units").upper()
 
     def ask_if_known(self, what: str) -> str:
         """The text after ``WHAT``; empty if the server does not know ``what``."""
@@ -246,7 +252,7 @@ class ShellState:
     runs_program = False
 
     def __init__(self, shell: ShellAccess) -> None:
-        self._shell, self._settings, self._asked_s = shell, shell.settings, time.monotonic()
+        self._shell, self._settings, self.asked_s = shell, shell.settings, time.monotonic()
 
     @cached_property
     def is_on(self) -> bool:
@@ -278,7 +284,7 @@ class ShellState:
     @cached_property
     def is_at_rest(self) -> bool:
         """Whether the joints stand still, as far as was seen."""
-        return self._shell.is_still(self.joints, self._asked_s)
+        return self._shell.is_still(self.joints, self.asked_s)
 
     @cached_property
     def pose(self) -> Sequence[float]:
@@ -298,7 +304,7 @@ class ShellState:
             FailedError: It counts in another unit.
         """
         unit_mm = self._settings.unit_mm
-        units = self._shell.ask_if_known("user_linear_units").upper()
+        units = self._shell.units
         if units and (own_mm := _UNITS_MM.get(units)) != unit_mm:
             action = "Set [TRAJ] LINEAR_UNITS = mm in its INI file"
             raise FailedError(

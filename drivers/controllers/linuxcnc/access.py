@@ -82,9 +82,11 @@ class Access(Protocol):
 
     Attributes:
         poll_s: the pause between two looks at it, s.
+        is_refused: whether it refused the block that was begun last.
     """
 
     poll_s: float
+    is_refused: bool
 
     def connect(self, told: Told) -> Told:
         """Connect; its name and description. Nothing moves."""

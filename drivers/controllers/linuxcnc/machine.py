@@ -188,7 +188,9 @@ class Machine:
             return FailedError("interrupted", "it was stopped on request")
         if not said and state.is_on and state.mode != MDI:
             return FailedError("interrupted", str(foreign_mode(state)), action=ALONE)
-        return FailedError("interrupted", said or self._reason(state))
+        # Another client, as a screen, may have taken the message that says why.
+        kind = "refused" if self._access.is_refused and state.is_on else "interrupted"
+        return FailedError(kind, said or self._reason(state))
 
     def _reason(self, state: State) -> str:
         """Why it does nothing where it says nothing."""

@@ -84,6 +84,7 @@ class ModuleAccess:
     """
 
     poll_s = 0.005
+    is_refused = False
 
     def __init__(self) -> None:
         self._own = threading.local()

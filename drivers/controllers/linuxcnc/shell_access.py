@@ -47,7 +47,7 @@ class ShellAccess:
         self._queries: Connection | None = None
         self._is_in_control = False
         self._explained: list[str] = []
-        self._is_refused = False
+        self.is_refused = False
         self._ended_s: float | None = None
         self._forgotten_s, self._seen_s = 0.0, 0.0
         self._seen: Sequence[float] = ()
@@ -87,7 +87,7 @@ class ShellAccess:
         """Have a block executed."""
         self._own().send(f"set mdi {block}")
         self._forget()
-        self._ended_s, self._is_refused = None, False
+        self._ended_s, self.is_refused = None, False
 
     def is_over(self, state: State, pose: Sequence[float] | None = None) -> bool:
         """Whether the block was answered, and the machine is there or stands still.
@@ -98,11 +98,11 @@ class ShellAccess:
         if commands.is_waiting:
             if (response := commands.response(_PAUSE_S)) is None:
                 return False
-            self._is_refused = not self._is_accepted(response)
+            self.is_refused = not self._is_accepted(response)
             self._forget()
-        if pose is None and self._is_refused:
+        if pose is None and self.is_refused:
             raise FailedError("refused", "it refuses to restore its modes")
-        if pose is None or self._is_refused or state.is_at(pose):
+        if pose is None or self.is_refused or state.is_at(pose):
             return True
         now = time.monotonic()
         if self._ended_s is None or not state.is_at_rest:

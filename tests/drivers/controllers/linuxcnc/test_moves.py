@@ -95,7 +95,7 @@ async def test_a_refused_pose_reports_all_messages_once(ready, controller) -> No
         with pytest.raises(PoseRefused, match="fails kinematicsInverse; invalid params in linear command"):
             await ready.move(UNREACHABLE, MOVE_S)
     controller.says |= {"get error": b"ERROR emc_error: bad status from EMC\r\n", "set mdi": NAK}
-    with pytest.raises(MotionInterrupted, match=r": emc_error: bad status from EMC\."):
+    with pytest.raises(MoveRefused, match=r": emc_error: bad status from EMC$"):
         await ready.move(TARGET, MOVE_S)
 
 

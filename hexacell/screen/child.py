@@ -1,6 +1,7 @@
 """Long computations in a process of their own: keys are heard meanwhile, and quitting ends it at once."""
 
 import asyncio
+import os
 import sys
 from asyncio.subprocess import DEVNULL, PIPE
 from pathlib import Path
@@ -34,6 +35,7 @@ class TriedPlan(Frozen):
     poses: tuple[VisitedPose, ...] = ()
 
 
+LEAST_URGENT = 19
 Found = TypeVar("Found", Preflight, TriedPlan)
 
 
@@ -82,5 +84,7 @@ def find_plan(path: Path) -> TriedPlan:
 
 if __name__ == "__main__":
     named, file, mode_name = sys.argv[1:]
+    if named == "plan" and hasattr(os, "nice"):
+        os.nice(LEAST_URGENT)  # the screen and a run come first
     found = find_plan(Path(file)) if named == "plan" else find_preflight(Path(file), Mode(mode_name))
     sys.stdout.write(found.model_dump_json())

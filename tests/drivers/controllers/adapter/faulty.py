@@ -30,7 +30,7 @@ REQUESTS = (
     "reload",
 )
 IMPATIENT = Timeouts(
-    connect=5.0, answer=1.0, command=1.0, arrival=0.05, reload=1.0, beyond_move=0.7, closing=0.5
+    connect=5.0, answer=1.0, command=1.0, arrival=0.05, reload=1.0, beyond_move=0.7, stop=1.0, closing=0.5
 )
 ALL = frozenset(StartupAction)
 TARGETS = (Pose(5.0, -195.0, 555.0, 3.0), Pose(0.0, -200.0, 550.0), Pose(2.0, -200.0, 550.0))

@@ -61,7 +61,7 @@ def serve(
     answers: TextIO = sys.stdout,
     ends: Callable[[Exception], bool] = lambda _error: False,
 ) -> None:
-    """Answer each line of requests until they end; then the robot is stopped, if it is doing anything.
+    """Answer each line of requests until they end; then the robot is stopped, if it does anything or moves.
 
     ``ends`` is given each error that is no answer: whether it ends the service.
     """
@@ -89,10 +89,19 @@ class _Service:
                 self._orders.put(request)
         self._orders.put(None)
         worker.join(IDLE_S)
-        while worker.is_alive():  # again, as the first one may precede the motion
+        is_over = not worker.is_alive() and not self._moves()
+        while not is_over:  # again, as the first one may precede the motion
             with suppress(FailedError):
                 self._robot.stop()  # nobody is there any more who could
             worker.join(AGAIN_S)
+            is_over = not worker.is_alive()
+
+    def _moves(self) -> bool:
+        """Whether the robot moves, or may, although all that was asked for is done."""
+        try:
+            return bool(self._robot.status().get("moving", True))
+        except FailedError:
+            return True
 
     def _work(self) -> None:
         while (request := self._orders.get()) is not None:

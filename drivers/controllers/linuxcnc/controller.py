@@ -6,11 +6,12 @@ from typing import cast
 from drivers.controllers.adapter.controller import AdapterController
 from drivers.controllers.adapter.link import Link, Timeouts
 from drivers.controllers.adapter.local_program import LocalRobot
-from drivers.controllers.adapter.messages import Failed, Nothing, Status
+from drivers.controllers.adapter.messages import Status
 from drivers.controllers.adapter.options import Program
 from drivers.controllers.linuxcnc.machine import Machine
 from drivers.controllers.linuxcnc.shell_access import ShellAccess
 from drivers.controllers.linuxcnc.shell_protocol import Limits
+from drivers.errors import CommandRefused
 from drivers.wire_trace import LineRecord, TraceRecorder
 from hexacell.cell.fields import Text, key
 from hexacell.cell.robot import ControllerOptions, ControllerSettings
@@ -25,7 +26,7 @@ class LinuxcncController(AdapterController):
     """What both have in common: coordinates are checked, and an emergency stop leaves it homed."""
 
     async def check(self) -> None:
-        """Check that its coordinates are those of the machine; nothing is set, nothing moves.
+        """Check that its coordinates are those of the machine, in control of it; nothing moves.
 
         Raises:
             DeviceError: Units, offsets, modal codes or the feed override make moves other than commanded.
@@ -34,9 +35,10 @@ class LinuxcncController(AdapterController):
             await self._check(self._session.connected())
 
     async def _check(self, link: Link) -> None:
-        found = await link.ask("check", Nothing)
-        if isinstance(found, Failed):
-            raise DeviceError(found.reason, subject=self._name, action=found.action)
+        try:
+            await self._do(link, "check", self._timeouts.answer)
+        except CommandRefused as found:
+            raise DeviceError(found.reason, subject=self._name, action=found.action) from found
 
     async def _undisturbed(self, link: Link) -> Status:
         status = await super()._undisturbed(link)

@@ -13,7 +13,7 @@ from asyncua.ua.status_codes import StatusCodes
 
 from drivers.controllers.adapter.served_robot import FailedError
 from drivers.controllers.opcua.program import Plc
-from tests.drivers.controllers.opcua.plc import VT, PlcServer
+from tests.drivers.controllers.opcua.plc import CYCLE_S, VT, PlcServer
 from tests.waiting import wait_until
 
 FAR, NEAR = (0.0, 0.0, 500.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 5.0)
@@ -70,6 +70,12 @@ FAULTS = (
 )
 
 
+def _rests(plc: PlcServer) -> bool:
+    before = plc.machine.pose()
+    threading.Event().wait(CYCLE_S)
+    return plc.machine.pose() == before
+
+
 def repair(plc: PlcServer) -> None:
     """End all faults; the emergency stop stays."""
     plc.forced.clear()
@@ -114,6 +120,7 @@ def moved_in_spite_of(
         if NO_LINK in told:  # what was on its way may begin yet, until the PLC misses its client
             wait_until(lambda: plc.program.is_late)
         wait_until(lambda: plc.stands or not plc.program.outputs["moving"])
+        wait_until(lambda: _rests(plc))  # what was stopped may take one more step
         at_rest = plc.machine.pose()
         repair(plc)
     with prepared(plc) as client:

@@ -73,6 +73,7 @@ figures: venv
 	.venv/bin/hexacell study design --folder build/study
 	cp build/study/paper.svg docs/study-paper.svg
 	cp build/study/design.svg docs/study-design.svg
+	$(RUN) docs.minutes
 	$(RUN) tests.benchmarks.figures
 
 screenshots:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from hexacell.campaign.budget import Budget
 from hexacell.campaign.decisions import CampaignState, Forecast
 from hexacell.campaign.task_accuracy import Task, TaskError
+from hexacell.campaign.time_model import TimeModel
 from hexacell.design import candidates
 from hexacell.design.candidates import ReachableTargets, reachable
 from hexacell.design.criteria import D_OPTIMAL, add_information, covariance_update
@@ -38,12 +39,14 @@ class Forecaster:
 
     Attributes:
         sizes: gives how many records each point gets at most, by what is known in a state.
+        times: gives how long records take, likewise.
         planned_sets: gives a set of poses at each point, which represent those not selected yet.
         from_commands: gives commanded poses in the frame convention.
         systematic_mm: gives the standard uncertainty by the systematic effects at the end, if it is known.
     """
 
     sizes: Callable[[CampaignState], Mapping[int, int]]
+    times: Callable[[CampaignState], TimeModel]
     budget: Budget
     task: Task
     planned_sets: Callable[[], Sequence[PoseBatch]]
@@ -73,7 +76,7 @@ class Forecaster:
             # The planned sets may give less information than the record actually selected.
             end_mm=after if selected and records == 1 else min(end, after),
             records=records,
-            minutes=self.budget.time_model.minutes(records, len(set(planned) - {state.point})),
+            minutes=self.times(state).minutes(records, len(set(planned) - {state.point})),
             systematic_mm=self.systematic_mm(),
         )
 
@@ -156,17 +159,17 @@ class Forecaster:
         is_begun = state.point == point
         most = self._most(state, point, len(state.measurements), state.begun_points)
         sizes = sorted({min(size, most) for size in SET_SIZES} - ({0} if is_begun else {0, 1}))
-        options = []
+        options, times = [], self.times(state)
         for size in sizes:
             after = add_information(covariance, information.added(state, point, size))
-            minutes = self.budget.time_model.minutes(size, 0 if is_begun else 1)
+            minutes = times.minutes(size, 0 if is_begun else 1)
             gain = (error.worst(covariance) - error.worst(after)) / size
             options.append((gain, (error.mean_square(covariance) - error.mean_square(after)) / minutes))
         return options
 
     def _most(self, state: CampaignState, point: int, records: int, points: int) -> int:
         """How many more records a point may get after some records at some points."""
-        affordable = self.budget.records_left(records, points + (state.point != point))
+        affordable = self.budget.records_left(records, points + (state.point != point), self.times(state))
         return int(min(self.sizes(state)[point] - state.records_at(point), affordable))
 
 

@@ -11,14 +11,20 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.model import Robot
 
+COMPARED = 3
+"""Poses at each held-out point, its reference among them, that are measured before the write-back as well:
+so many show how wrong the robot was, and what the model is judged by comes from those afterwards."""
+
 SHARES = (0.0, 1.0 / 3.0, 2.0 / 3.0)
 """Shares of the way to the middle, by which a point is moved that the robot has too few poses at."""
 
 
 def held_out_sets(
-    robot: Robot, settings: CellSettings, found: Identification, turns: Array
+    robot: Robot, settings: CellSettings, found: Identification, turns: Array, count: int
 ) -> Iterator[PoseBatch | LimitError]:
-    """The poses at each held-out point, or why the robot has too few; ``turns`` (n, 3, 3) are candidates.
+    """``count`` poses at each held-out point, or why the robot has too few.
+
+    They are selected of the candidates ``turns`` (n, 3, 3).
 
     Where a point has too few, because the ball would leave the travel or the robot its limits, they are at
     one nearer to the middle of the points that the geometry is identified at.
@@ -30,7 +36,7 @@ def held_out_sets(
         for share in SHARES:
             moved = ball + share * (own.mean(axis=0) - ball)
             try:
-                yield select_validation_poses(belief, moved, wanted.orientations, turns, used)
+                yield select_validation_poses(belief, moved, count, turns, used)
                 break
             except LimitError as error:
                 failures.append(error)

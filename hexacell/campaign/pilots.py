@@ -27,7 +27,7 @@ FIRST_REPEAT = 2 * MOST_POSES + 1
 CAUTION = 3.0
 """Factor by which the noise may exceed what is stated while pilot poses are chosen."""
 
-PER_DEPARTURE, MOST_PILOTS = 3, 14
+PER_DEPARTURE, MOST_PILOTS = 3, 6
 """Pilot poses before the robot comes back to the reference, and in all."""
 
 PER_DEPARTURE_TO_A_LIST, MOST_TO_A_LIST = 4, 24

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from hexacell.campaign import decisions
-from hexacell.campaign.budget import Budget, shared_sizes
+from hexacell.campaign.budget import Budget, paid_sizes, shared_sizes
 from hexacell.campaign.forecast import Forecaster, PlannedInformation, select_sets
 from hexacell.campaign.online_estimate import OnlineEstimate, OnlineEstimator, RecordEstimator
 from hexacell.campaign.pilots import CAUTION, FIRST_PILOT, MOST_PILOTS, MOST_TO_A_LIST, pilots_per_departure
@@ -20,6 +20,7 @@ from hexacell.campaign.pose_chooser import PoseChooser, is_well_known
 from hexacell.campaign.pose_list import PoseList
 from hexacell.campaign.stopping_rules import Goal, StoppingRules
 from hexacell.campaign.task_accuracy import Task, planned_budget
+from hexacell.campaign.time_model import TimeModel
 from hexacell.cell.model import CellSettings
 from hexacell.design.search_effort import USUAL_EFFORT, SearchEffort
 from hexacell.errors import IdentifiabilityError, LimitError
@@ -158,13 +159,29 @@ class Plan:
     def sizes(self, state: decisions.CampaignState) -> Mapping[int, int]:
         """How many records each point gets at most, once some points were found to be out of reach.
 
-        What a file lists, a goal needs, or points gain in the same time, is not shared.
+        What a file lists, a goal needs, or points gain in the same time, is not shared. A budget in minutes
+        decides how many the points get that are not done.
         """
         planned = {point: self.records_at(point) for point in self.points}
         is_shared = self.pose_list is None and self.goal is None
         if not is_shared or self.settings.identification.choose_points:
             return planned
-        return shared_sizes(planned, state, self._out_of_reach(state))
+        left = self._out_of_reach(state)
+        if self.budget.minutes is not None:
+            return paid_sizes(planned, state, left, self.budget, self.times(state))
+        return shared_sizes(planned, state, left)
+
+    def times(self, state: decisions.CampaignState) -> TimeModel:
+        """How long measuring takes, by the ways between the records so far."""
+        last, records = self._last_times, state.measurements.records
+        if not last or last[0][0] is not records:
+            last[:] = [(records, TimeModel.of(self.settings).after(self.robot, records))]
+        return last[0][1]
+
+    @cached_property
+    def _last_times(self) -> list[tuple[object, TimeModel]]:
+        """The last answer, if there was one, after the records that it is by."""
+        return []
 
     def reference_pose(self, point: int) -> Pose:
         """Where a point's gauges are zeroed, in the controller's frames."""
@@ -235,6 +252,7 @@ class Plan:
         """Forecasts what further records gain."""
         return Forecaster(
             self.sizes,
+            self.times,
             self.budget,
             self.task,
             lambda: self.planned_sets,

@@ -3,17 +3,18 @@
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.pose_list import PoseList
 from hexacell.campaign.task_accuracy import Task
+from hexacell.campaign.time_model import TimeModel
 from hexacell.cell.model import CellSettings
 from hexacell.design import candidates
 from hexacell.design.arrival_sides import with_best_sides
-from hexacell.design.candidates import Amplitudes
+from hexacell.design.candidates import Amplitudes, ReachableTargets
 from hexacell.design.criteria import D_OPTIMAL, Criterion
 from hexacell.design.pose_selection import SelectedPose, select_from_list, select_pose
 from hexacell.design.predicted_records import GaugeZero
@@ -129,8 +130,19 @@ class PoseChooser:
         refinement = self.effort.refinement(len(state.measurements))
         rounds = () if most < np.pi else refinement  # which would turn candidates further
         criterion = self._criterion(belief)
-        selected = select_pose(planner, zero, turns, criterion, known_then, rounds)
+        selected = select_pose(
+            planner, zero, turns, criterion, known_then, rounds, self._seconds_from(planner)
+        )
         return with_best_sides(planner, zero, selected, self._back, criterion, known_then)
+
+    def _seconds_from(self, planner: PathPlanner) -> Callable[[ReachableTargets], Array] | None:
+        """What records take from the planner's start (n,), s; None where that cannot be computed."""
+        start = planner.lines.actual_start
+        return partial(self._times.seconds_to, planner.belief, start) if start.found[0] else None
+
+    @cached_property
+    def _times(self) -> TimeModel:
+        return TimeModel.of(self.settings)
 
     @cached_property
     def _back(self) -> float:

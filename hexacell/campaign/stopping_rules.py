@@ -74,7 +74,8 @@ class StoppingRules:
     def _budget_used(self, state: CampaignState, *, points: int, records: int) -> str | None:
         """Whether so many more points and records cannot be afforded, in words."""
         budget = self.forecaster.budget
-        left = budget.records_left(len(state.measurements), state.begun_points + points)
+        times = self.forecaster.times(state)
+        left = budget.records_left(len(state.measurements), state.begun_points + points, times)
         return None if left >= records else f"the budget of {budget.description} is used"
 
     def _target_reached(self, state: CampaignState) -> str | None:

@@ -64,9 +64,10 @@ class IdentificationSettings(Section):
         0.0, "gain in that error below which no further record is worth its time, mm"
     )
     budget_records: int | None = key(None, "most records, references included", ge=2, le=MOST_RECORDS)
-    budget_minutes: Positive | None = key(None, "longest estimated duration, minutes")
+    budget_minutes: Positive | None = key(
+        None, "duration of the whole run, minutes; it decides how many records the points get"
+    )
     minutes_per_station: NotNegative = key(5.0, "time to place the gauges at a point by hand, minutes")
-    seconds_per_record: Positive | None = key(None, "time to move and settle, s; by default from [timing]")
     choose_points: bool = key(
         False, "whether the points with the largest gain per time are visited, not all in order"
     )
@@ -185,9 +186,6 @@ class TimingSettings(Section):
         0.06, "largest range of one encoder in the window", alias="spread_encoder_mm"
     )
     give_up_s: Positive = key(20.0, "longest wait for settled readings, s")
-    move_s: Positive | None = key(
-        None, "duration of an ordinary move, s, for time estimates only; by default from [speed]"
-    )
     clock_factor: Positive = key(1.0, "cell seconds per second of real time, in simulated cells only")
 
 

@@ -1,9 +1,10 @@
 """Selection of the pose to measure next: greedy optimal design under limits of travel and motion.
 
 Candidates that linear propagation puts inside the gauges' travel are scored first, by the gain of a
-criterion (:mod:`hexacell.design.criteria`), and the best of them are refined
-(:mod:`hexacell.design.candidate_refinement`). Their ranking is then walked from the best
-downward, a few candidates at a time, and the first is taken that
+criterion (:mod:`hexacell.design.criteria`) in a second of the time that the record takes: what counts is
+the machine's time, and poses near by cost less of it. The best of them are refined
+(:mod:`hexacell.design.candidate_refinement`). Their ranking is then walked from the best downward, a few
+candidates at a time, and the first is taken that
 
 1. the controller can be commanded to,
 2. satisfies the chance constraint on the travel
@@ -20,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.design.candidate_refinement import THOROUGH, CandidateSpace, Rounds
-from hexacell.design.candidates import commands_for, outcomes_of
+from hexacell.design.candidates import ReachableTargets, commands_for, outcomes_of
 from hexacell.design.criteria import D_OPTIMAL, Criterion
 from hexacell.design.predicted_records import GaugeZero, PredictedRecords, predict_records
 from hexacell.design.travel_monte_carlo import TravelConstraint
@@ -66,8 +67,11 @@ def select_pose(
     criterion: Criterion = D_OPTIMAL,
     known_then: Array | None = None,
     rounds: Rounds = THOROUGH,
+    seconds_to: Callable[[ReachableTargets], Array] | None = None,
 ) -> SelectedPose:
     """The best by a criterion of some orientations (n, 3, 3), relative to the platform's at the reference.
+
+    What gains most in the ``seconds_to`` (n,) go there and read is the best; without them, what gains most.
 
     They are not relative to the level platform: with millimetres of error in the joints the platform may
     be 20 degrees from where the controller believes it to be. A record has to gain beside what is
@@ -78,9 +82,12 @@ def select_pose(
     """
     belief = planner.belief
     covariance = belief.joint_covariance if known_then is None else known_then
-    space = CandidateSpace(
-        belief, zero, lambda some: criterion.gain(covariance, some.jacobian, some.covariance)
-    )
+
+    def rate(some: PredictedRecords) -> Array:
+        gains = criterion.gain(covariance, some.jacobian, some.covariance)
+        return gains if seconds_to is None else gains / seconds_to(some.targets)
+
+    space = CandidateSpace(belief, zero, rate)
     if (candidates := space.rated(orientations @ zero.orientation)) is None:
         raise LimitError("no orientation is within reach, joint range, tilt limit and singularity margin")
     if len(candidates):

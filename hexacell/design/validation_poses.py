@@ -10,6 +10,7 @@ import numpy as np
 from hexacell.design.candidates import ReachableTargets, reachable_targets
 from hexacell.design.criteria import innovation_covariance
 from hexacell.design.predicted_records import CHANCE_SIGMAS, TRAVEL_SHARE, position_derivatives
+from hexacell.design.short_order import short_order
 from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics import rotations
@@ -24,9 +25,17 @@ smaller tilts would validate too little."""
 
 
 def select_validation_poses(
-    belief: RobotBelief, point: Array, count: int, turns: Array, used: Array | None = None
+    belief: RobotBelief,
+    point: Array,
+    count: int,
+    turns: Array,
+    used: Array | None = None,
+    coming_from: PoseBatch | None = None,
 ) -> PoseBatch:
-    """``count`` poses at a point (3,), mm; the first is level.
+    """``count`` poses at a point (3,), mm; the first is level, the others in a short order from there.
+
+    Or from a command (1) that the robot is ``coming_from``, at the same point, and in any case back to the
+    first.
 
     The ball stays inside the travel although the controller still commands with its own geometry, and
     the corrected robot can take them too. Of the ``turns`` (n, 3, 3) that allow this, those are
@@ -53,7 +62,8 @@ def select_validation_poses(
         raise LimitError(
             f"only {len(selected)} orientations at {poses.pose(0)} keep the ball inside the travel"
         )
-    return poses[inside][selected]
+    chosen, there = poses[inside][selected], actual.poses[inside][selected]
+    return chosen[_in_short_order(belief, chosen, there.positions[0], coming_from)]
 
 
 def _stays_inside(belief: RobotBelief, actual: ActualPoses) -> Mask:
@@ -102,6 +112,23 @@ def _select_farthest(
             break
         selected.append(best)
     return selected
+
+
+def _in_short_order(
+    belief: RobotBelief, commands: PoseBatch, reference: Array, coming_from: PoseBatch | None
+) -> list[int]:
+    """Rows of selected commands: the first, then the others as the way over them and back is short."""
+    home = commands[[0]]
+    way = PoseBatch.joined([coming_from or home, commands[np.arange(1, len(commands))], home])
+    apart = np.array([_angles(way.rotations, turned) for turned in way.rotations])
+
+    def is_clear_between(start: int, end: int) -> bool:
+        # The way from another list of poses is planned when it is gone.
+        is_begin = start == 0 and coming_from is not None
+        return is_begin or is_clear(belief, way[[start]], way[[end]], reference)
+
+    order = short_order(apart, is_clear_between)
+    return [0, *(range(1, len(commands)) if order is None else order)]
 
 
 def _angles(orientations: Array, other: Array) -> Array:

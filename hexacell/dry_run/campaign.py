@@ -1,19 +1,31 @@
 """A plan carried out on virtual robots, decision by decision, and what it gives: before anything moves."""
 
+import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from statistics import median
 
 import numpy as np
 
 from hexacell.campaign import decisions
-from hexacell.campaign.budget import TimeModel, noise_minutes
 from hexacell.campaign.planner import Plan
+from hexacell.campaign.time_model import (
+    MOVE_OVERHEAD_S,
+    Seconds,
+    TimeKind,
+    TimeModel,
+    no_seconds,
+    seconds_beside,
+    speed_limits,
+)
 from hexacell.checks.quick_level import QuickAccuracy, QuickLevel
 from hexacell.dry_run.verdict_forecast import VerdictForecast, predicted_verdicts
 from hexacell.errors import HexacellError, ReachError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.motion.durations import line_duration
 from hexacell.robot.virtual_robot import VirtualRobot, robots_within_tolerances
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.verdict.acceptance_gates import gates
@@ -31,7 +43,8 @@ class VirtualCampaign:
 
     The robot is placed at each pose; what is between is left to subclasses. Where the cell says so, the
     controller commands with the estimate once the robot is known well enough. ``outside`` is the number of
-    records at which the ball left the gauges' travel; they are not taken.
+    records at which the ball left the gauges' travel; they are not taken. ``seconds`` is what it took so
+    far, ``course`` the minutes and the predicted U, or error, before each record.
     """
 
     plan: Plan
@@ -39,6 +52,13 @@ class VirtualCampaign:
     state: decisions.CampaignState = field(default_factory=decisions.CampaignState)
     outside: int = 0
     reason: str = ""
+    seconds: Seconds = field(default_factory=no_seconds)
+    course: list[tuple[float, float]] = field(default_factory=list)
+
+    @property
+    def minutes(self) -> float:
+        """How long it took so far."""
+        return sum(self.seconds.values()) / 60.0
 
     @property
     def measurements(self) -> MeasurementSet:
@@ -60,18 +80,29 @@ class VirtualCampaign:
         Raises:
             HexacellError: it cannot be made or carried out.
         """
+        begun_s = time.process_time()
         decision = self.plan.decide(self.state)
+        self.seconds[TimeKind.DECIDING] += time.process_time() - begun_s
         match decision:
             case decisions.StartPoint():
+                self._pass([decision.pose])
                 self._go_to_point(decision)
                 self.virtual_robot.zero_gauges()
                 self._measure(decision)
+                times = TimeModel.of(self.plan.settings)
+                self.seconds[TimeKind.PLACING] += times.place_s
+                self.seconds[TimeKind.MOVING] += times.trial_s
                 # As to measure the noise, it leaves the first reference for pilot poses and comes back.
                 reference = self.state.present
                 while reference is not None and self._depart():
+                    self._pass([reference])
                     self._return_to(reference)
                     self.state = replace(self.state, present=reference)
             case decisions.MeasurePose():
+                if decision.forecast is not None:
+                    now = decision.forecast.expanded_mm(decision.forecast.now_mm)
+                    self.course.append((self.minutes, decision.forecast.now_mm if now is None else now))
+                self._pass([*decision.via, decision.pose])
                 self._go_to_pose(decision)
                 self._measure(decision)
             case decisions.FinishPoint(point=point):
@@ -85,10 +116,18 @@ class VirtualCampaign:
         for taken in range(self.plan.pilots_per_departure):
             if (pilot := self.plan.pilot_pose(self.state)) is None:
                 return taken > 0
+            self._pass([*pilot.via, pilot.pose])
             self._go_to_pose(pilot)
             if (record := self._take(pilot)) is not None:
                 self.state = replace(self.state, pilots=(*self.state.pilots, record))
         return True
+
+    def _pass(self, way: Sequence[Pose]) -> None:
+        """What it takes to move from where the robot is over some poses to the last of them."""
+        robot, speeds = self.plan.robot, speed_limits(self.plan.settings.speed, at_gauges=True)
+        for start, end in pairwise([one for one in (self.state.present, *way) if one is not None]):
+            line = line_duration(robot.mechanism, robot.controller, robot.branch, start, end, speeds)
+            self.seconds[TimeKind.MOVING] += line + MOVE_OVERHEAD_S
 
     def _go_to_point(self, start: decisions.StartPoint) -> None:
         self.virtual_robot.place(start.pose)
@@ -111,6 +150,7 @@ class VirtualCampaign:
 
     def _take(self, decision: decisions.StartPoint | decisions.MeasurePose) -> Record | None:
         """The record at the pose of a decision; None where the ball left the gauges' travel."""
+        self.seconds[TimeKind.READING] += self.plan.settings.timing.window_s
         record = self.virtual_robot.measure(decision.point, decision.orientation)
         self.state = replace(self.state, present=decision.pose)
         if self.plan.robot.limits.room.holds(np.array(record.deviation)):
@@ -122,6 +162,7 @@ class VirtualCampaign:
     def _finish(self, point: int, reference: Pose) -> None:
         """Return to the point's reference; it is finished if nothing can be measured from there either."""
         if self.state.present != reference:
+            self._pass([reference])
             self._return_to(reference)
             self.state = replace(self.state, present=reference)
             return
@@ -150,10 +191,11 @@ class DryRunResult:
         points: number of points that are measured, with so many ``records``.
         outside: records at which the ball left the gauges' travel, over all robots.
         worst_sigma_mm: predicted error at the worst task pose afterwards; None without task poses.
-        minutes: time to measure, noise and held-out poses included.
+        seconds: what the whole run takes of each kind, noise and held-out poses included.
         expanded_mm: U of the largest error at the task poses, systematic effects included; None without.
         verdicts: the verdicts on healthy machines; None without task poses or held-out poses.
         visited: the poses of the first of these robots, in their order, with point and orientation.
+        course: had that run been ended earlier, its minutes and U (the error where U is not known), mm.
     """
 
     drawn: int
@@ -162,10 +204,16 @@ class DryRunResult:
     records: int
     outside: int
     worst_sigma_mm: float | None
-    minutes: float
+    seconds: Seconds = field(default_factory=no_seconds)
     expanded_mm: float | None = None
     verdicts: VerdictForecast | None = None
     visited: tuple[VisitedPose, ...] = ()
+    course: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def minutes(self) -> float:
+        """How long the whole run takes."""
+        return sum(self.seconds.values()) / 60.0
 
 
 def dry_run(plan: Plan) -> DryRunResult:
@@ -215,18 +263,15 @@ def _carry_out(plan: Plan, truth: Geometry, number: int) -> _Outcome | None:
 
 def _summary(plan: Plan, tried: int, identified: list[_Outcome]) -> DryRunResult:
     if not identified:
-        return DryRunResult(tried, 0, 0, 0, 0, None, 0.0)
+        return DryRunResult(tried, 0, 0, 0, 0, None)
     points = round(median(outcome.campaign.state.begun_points for outcome in identified))
     records = round(median(len(outcome.campaign.measurements) for outcome in identified))
-    pilots = round(median(len(outcome.campaign.state.pilots) for outcome in identified))
     errors = [outcome.forecast.now_mm for outcome in identified if outcome.forecast is not None]
     verdicts = [outcome.verdicts for outcome in identified if outcome.verdicts is not None]
     expanded = [outcome.budget.expanded_mm for outcome in identified if outcome.budget is not None]
-    held_out, first = plan.settings.verification, identified[0].campaign
-    straight = TimeModel.of(plan.settings, moves=1.0)
-    points_held_out = len(held_out.points)
-    common, wide = points_held_out * held_out.orientations, points_held_out * (held_out.orientations - 1)
-    before, after = (straight.minutes(poses, points_held_out) for poses in (common, common + wide))
+    first, beside = identified[0].campaign, seconds_beside(plan.settings)
+    rest = sum(beside.values()) / 60.0
+    taken = {kind: median(outcome.campaign.seconds[kind] for outcome in identified) for kind in TimeKind}
     return DryRunResult(
         drawn=tried,
         robots=len(identified),
@@ -234,13 +279,11 @@ def _summary(plan: Plan, tried: int, identified: list[_Outcome]) -> DryRunResult
         records=records,
         outside=sum(outcome.campaign.outside for outcome in identified),
         worst_sigma_mm=median(errors) if errors else None,
-        minutes=noise_minutes(plan.settings, pilots)
-        + plan.budget.time_model.minutes(records, points)
-        + before
-        + after,
+        seconds={kind: taken[kind] + beside[kind] for kind in TimeKind},
         expanded_mm=median(expanded) if expanded else None,
         verdicts=VerdictForecast.mean(verdicts) if verdicts else None,
         visited=tuple((one.point, one.orientation, one.pose) for one in first.measurements.records),
+        course=tuple((minutes + rest, error) for minutes, error in first.course),
     )
 
 
@@ -275,6 +318,5 @@ def try_quick_level(quick: QuickLevel) -> QuickTrial:
         except HexacellError:
             continue
         points = campaign.state.begun_points
-        minutes = plan.budget.time_model.minutes(len(campaign.measurements), points)
-        return QuickTrial(accuracy, points, noise_minutes(plan.settings, pilots=0) + minutes)
+        return QuickTrial(accuracy, points, campaign.minutes)
     return QuickTrial(None)

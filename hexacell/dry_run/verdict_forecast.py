@@ -193,7 +193,8 @@ def with_held_out_records(plan: Plan, found: Identification) -> Identification:
     robot = plan.robot.with_controller(plan.robot.for_controller(written))
     turns = held_out_turns(robot, plan.settings, plan.effort.forecast_held_out_candidates)
     records: list[Record] = []
-    for point, poses in enumerate(held_out_sets(robot, plan.settings, found, turns), 1 + max(plan.points)):
+    sets = held_out_sets(robot, plan.settings, found, turns, plan.settings.verification.orientations)
+    for point, poses in enumerate(sets, 1 + max(plan.points)):
         if isinstance(poses, PoseBatch):
             records += exact_records(robot, point, poses)
     if not records:

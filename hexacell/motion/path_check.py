@@ -117,14 +117,14 @@ class LinesFrom:
         self, commands: PoseBatch, joints: Array, rows: NDArray[np.intp], *, thorough: bool
     ) -> tuple[PoseBatch, NDArray[np.intp]]:
         """Actual poses along some lines, and the rows of those without a singularity."""
-        if not len(rows) or not self._actual_start.found[0]:
+        if not len(rows) or not self.actual_start.found[0]:
             return commands, rows[:0]
         actual, found = trace_path(
             self.belief.mechanism,
             self.belief.estimate,
             commands[:, rows],
             joints[:, rows],
-            self._actual_start.poses,
+            self.actual_start.poses,
             thorough=thorough,
         )
         return commands.with_rows(np.s_[:, rows], actual), rows[found]
@@ -132,19 +132,20 @@ class LinesFrom:
     @cached_property
     def _belief(self) -> RobotBelief:
         """The robot that may be beyond a limit where it stands, and come back from there."""
-        if not self._actual_start.found[0]:
+        if not self.actual_start.found[0]:
             return self.belief
-        return self.belief.standing_at(self.start, self._actual_start, self._wanted_margins)
+        return self.belief.standing_at(self.start, self.actual_start, self._wanted_margins)
 
     @cached_property
     def _wanted_margins(self) -> Array:
         """Margins of passive joints and legs. With gauges at the ball the choice of records checks more."""
-        if self.reference is not None or not self._actual_start.found[0]:
+        if self.reference is not None or not self.actual_start.found[0]:
             return self.belief.least_margins
-        return np.asarray(self.belief.margins_at(self._actual_start)[0])
+        return np.asarray(self.belief.margins_at(self.actual_start)[0])
 
     @cached_property
-    def _actual_start(self) -> ActualPoses:
+    def actual_start(self) -> ActualPoses:
+        """Where the estimated robot is at the start."""
         return self.belief.commanded.actual_poses(self.start)
 
 

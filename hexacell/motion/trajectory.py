@@ -1,4 +1,4 @@
-"""Straight lines of commands, the actual path of a robot under its controller, and how long that takes.
+"""Straight lines of commands, and the actual path of a robot under its controller.
 
 The controller interpolates the command linearly. The actual pose at each point of the line closes the
 robot's own geometry at the joint variables that the controller computes; it is found by path tracking
@@ -8,10 +8,6 @@ moves the last actual pose by the change of the command, the corrector is Newton
 Tracking point by point is slow for many lines, so :func:`trace_path` first corrects all points of all
 lines at once, each predicted from the start of its line. That is exact wherever Newton's method stays on
 the branch. Lines that may have left it are verified, and tracked point by point if that fails.
-
-A move must last so long that nothing on its way is faster than allowed. A controller that gets a duration
-(inverse time, G93) passes the way at one rate of its parameter, so the fastest piece decides about all of
-them. A feed rate would not do: it counts X, Y and Z only, so a platform that tilts about the ball has none.
 """
 
 from collections.abc import Sequence
@@ -23,8 +19,8 @@ import numpy as np
 from hexacell.kinematics import rotations
 from hexacell.kinematics.forward import forward_kinematics, modes_of
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Branch, Mechanism
-from hexacell.kinematics.pose import SAME_FRAMES, FrameTransform, Pose, PoseBatch
+from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.pose import SAME_FRAMES, FrameTransform, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 
 PIECES = 12
@@ -38,12 +34,6 @@ JUMP_MM = 20.0
 JUMP_ANGLE = np.radians(10.0)
 """Largest difference, within a piece of a line, between the motion of the robot and of the command.
 A larger one may be a jump to another solution."""
-
-WAY_PIECES = 48
-"""Pieces of a way, within which speeds hardly differ."""
-
-SHORTEST_S = 0.1
-"""Duration of a move that goes hardly anywhere, s."""
 
 
 def interpolate_line(
@@ -175,34 +165,3 @@ def _track(robot: _Robot, commands: PoseBatch, joints: Array, start: PoseBatch) 
             before, after = commands[piece : piece + 1, rows], commands[piece + 1 : piece + 2, rows]
             predicted = _predict(before, after, actual)
     return tracked, np.isin(np.arange(lines), rows)
-
-
-@dataclass(frozen=True, slots=True)
-class SpeedLimits:
-    """The largest speeds of any joint variable, and of the ball and the platform's joints, its edge."""
-
-    joint: float
-    edge_mm_s: float
-
-
-def shortest_duration(joints: Array, points: Array, limits: SpeedLimits) -> float:
-    """The shortest duration, s, of a way that is passed at a constant rate of its rows.
-
-    The way: ``joints`` (k, 6), mm, and ``points`` (k, m, 3) of the platform's edge in the base frame, mm,
-    evenly in its parameter. Joints that are out of reach (NaN) do not count.
-    """
-    by_joints = np.abs(np.diff(joints, axis=0)).max(axis=1) / limits.joint
-    by_edge = np.linalg.norm(np.diff(points, axis=0), axis=2).max(axis=1) / limits.edge_mm_s
-    slowest = float(np.fmax(by_joints, by_edge).max())
-    return max(SHORTEST_S, slowest * (len(joints) - 1))
-
-
-def line_duration(
-    mechanism: Mechanism, geometry: Geometry, branch: Branch, start: Pose, end: Pose, limits: SpeedLimits
-) -> float:
-    """The shortest duration, s, of a controller's straight line from ``start`` to ``end``."""
-    line = interpolate_line(PoseBatch.of([start]), PoseBatch.of([end]), WAY_PIECES)
-    joints = mechanism.inverse(geometry, branch, line)
-    platform_joints = mechanism.legs(geometry, line, joints).platform_joints
-    edge = np.concatenate([line.positions[:, None], platform_joints], axis=1)
-    return shortest_duration(joints, edge, limits)

@@ -1,6 +1,5 @@
 """The noise that a run has measured at its start, and what follows from it for everything after."""
 
-from hexacell.campaign.budget import TimeModel
 from hexacell.cell.fields import Frozen, Point, SixNumbers
 from hexacell.cell.model import CellSettings
 from hexacell.cell.uncertainty import STOPS, repeatability_key
@@ -77,9 +76,8 @@ def with_measured_noise(settings: CellSettings, measured: MeasuredNoise) -> Cell
 
 def with_windows(settings: CellSettings, windows: int) -> CellSettings:
     """The settings of a cell whose records take the time of some windows."""
-    seconds = TimeModel.of(settings).record_seconds + averaging_seconds(settings, windows)
-    planned = settings.identification.model_copy(update={"seconds_per_record": seconds})
-    return settings.model_copy(update={"identification": planned})
+    timing = settings.timing.model_copy(update={"window_s": windows * settings.timing.window_s})
+    return settings.model_copy(update={"timing": timing})
 
 
 def averaging_seconds(settings: CellSettings, windows: int) -> float:

@@ -14,9 +14,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from hexacell.campaign.budget import Budget
 from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.planner import Plan
+from hexacell.campaign.time_model import TimeModel
 from hexacell.identification.problem.prior import Noise
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.parameters import JointUnit
@@ -221,8 +221,8 @@ def end_error(plan: Plan, noise: Noise, windows: int = 1) -> float | None:
 
     Records of more windows take longer: a budget in minutes pays for fewer.
     """
-    budget = Budget.of(measured_noise.with_windows(plan.settings, windows))
-    forecaster = replace(plan.forecaster, budget=budget)
+    times = TimeModel.of(measured_noise.with_windows(plan.settings, windows))
+    forecaster = replace(plan.forecaster, times=lambda _: times)
     belief = replace(plan.robot.belief(), noise=noise)
     after = forecaster.predicted_belief(belief, CampaignState())
     return forecaster.worst_error(CampaignState(), after)

@@ -6,16 +6,21 @@ from drivers.interfaces import DeviceIdentity
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
 from hexacell.campaign.feasibility import records_for
 from hexacell.checks.quick_level import QuickAccuracy
-from hexacell.dry_run.campaign import QuickTrial
+from hexacell.dry_run.campaign import DryRunResult, QuickTrial
 from hexacell.dry_run.verdict_forecast import NOISE, WANTED, VerdictForecast
 from hexacell.lengths import rounded_up, shown, unit_of
 from hexacell.measurements.records import RecordId
 from hexacell.services.offline import PlanTrial
 from hexacell.text.layout import duration
 from hexacell.text.measured_noise import averaging_lines
+from hexacell.text.time_spent import spent_text
 from hexacell.verdict.decision import Verdict
 
 TRYING_PLAN = "Trying the plan on simulated robots within the tolerances, some seconds ..."
+
+
+SHOWN_BUDGETS = 4
+"""For so many shorter durations it is told what they would give."""
 
 
 def decision_text(decision: StartPoint | MeasurePose | Finished) -> str:
@@ -96,13 +101,14 @@ def plan_trial_lines(trial: PlanTrial) -> Iterator[str]:
         yield (
             f"{result.records} records at {result.points} points will give about "
             f"{shown(result.worst_sigma_mm)} at the worst of your task poses (one sigma), in about "
-            f"{duration(result.minutes)}."
+            f"{spent_text(result.seconds)}."
         )
         if result.expanded_mm is not None:
             yield (
                 f"The expanded uncertainty U of the largest error there will be about "
                 f"{shown(result.expanded_mm)}, with the systematic effects of [uncertainty]."
             )
+        yield from _course_lines(result)
         if result.verdicts is not None:
             yield from verdict_forecast_lines(result.verdicts, result.records)
         yield from averaging_lines(trial.averaging, trial.encoders_part_mm)
@@ -117,6 +123,21 @@ def plan_trial_lines(trial: PlanTrial) -> Iterator[str]:
                 f"Point {point}: {share:.0%} of the robots within the tolerances cannot reach it "
                 "within their limits; if yours is one of them, the run leaves it out or stops."
             )
+
+
+def _course_lines(result: DryRunResult) -> Iterator[str]:
+    """What fewer minutes would give, at a few of them."""
+    if len(result.course) < SHOWN_BUDGETS:
+        return
+    first, last = int(result.course[0][0]) + 1, int(result.minutes)
+    step = max(1, round((last - first) / SHOWN_BUDGETS))
+    told = [
+        f"{limit} minutes {shown([size for minutes, size in result.course if minutes <= limit][-1])}"
+        for limit in range(first, last + 1, step)
+    ]
+    name = "the error" if result.expanded_mm is None else "U"
+    if told:
+        yield f"Sooner ([identification] budget_minutes) {name} would be larger: {', '.join(told)}."
 
 
 def device_line(identity: DeviceIdentity) -> str:

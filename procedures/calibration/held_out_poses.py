@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell.campaign.held_out_sets import held_out_sets, held_out_turns
+from hexacell.campaign.held_out_sets import COMPARED, held_out_sets, held_out_turns
 from hexacell.cell.model import CellSettings
 from hexacell.design.validation_poses import select_validation_poses
 from hexacell.errors import LimitError
@@ -46,16 +46,17 @@ class HeldOutPoses:
 
         Raises ``LimitError`` if all points are.
         """
-        sets = [*held_out_sets(self.robot, self.settings, identified, self._turns())]
+        count = min(COMPARED, self.settings.verification.orientations)
+        sets = [*held_out_sets(self.robot, self.settings, identified, self._turns(), count)]
         failures = [one for one in sets if isinstance(one, LimitError)]
         if len(failures) == len(sets):
             raise failures[0]
         return tuple(() if isinstance(one, LimitError) else self._commands(one) for one in sets)
 
     def after(self, identified: Identification, before: PosesByPoint) -> PosesByPoint:
-        """Others at the points of those that are measured ``before``, without their references."""
+        """Others at the points of those measured ``before``, which they follow, without references."""
         belief, turns, used = self.robot.belief(identified), self._turns(), identified.poses.rotations
-        return tuple(self._at(poses, belief, turns, used)[1:] for poses in before)
+        return tuple(self._at(poses, belief, turns, used, poses[-1:])[1:] for poses in before)
 
     def confirming(
         self, identified: Identification, before: PosesByPoint, after: PosesByPoint
@@ -67,15 +68,21 @@ class HeldOutPoses:
         return tuple(self._at(poses, belief, turns, used) for poses in before)
 
     def _at(
-        self, chosen: Sequence[SixNumbers], belief: RobotBelief, turns: Array, used: Array
+        self,
+        chosen: Sequence[SixNumbers],
+        belief: RobotBelief,
+        turns: Array,
+        used: Array,
+        coming_from: Sequence[SixNumbers] = (),
     ) -> tuple[SixNumbers, ...]:
         """Poses at the point of some; empty where these are, or the robot has too few others."""
         if not chosen:
             return ()
-        position = self.robot.from_commands([Pose(*chosen[0])]).positions[0]
+        point = self.robot.from_commands([Pose(*chosen[0])]).positions[0]
+        here = self.robot.from_commands(Pose(*pose) for pose in coming_from) if coming_from else None
         count = self.settings.verification.orientations
         try:
-            return self._commands(select_validation_poses(belief, position, count, turns, used))
+            return self._commands(select_validation_poses(belief, point, count, turns, used, here))
         except LimitError:
             return ()
 

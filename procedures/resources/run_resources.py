@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from drivers.interfaces import StartupAction
-from hexacell.campaign.budget import speed_limits
+from hexacell.campaign.time_model import speed_limits
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
 from hexacell.clock import CellClock
@@ -19,7 +19,8 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import Directions, deviation_of, joints_of
 from hexacell.motion.arrival import arrival_directions, least_way
-from hexacell.motion.trajectory import interpolate_line, line_duration
+from hexacell.motion.durations import line_duration
+from hexacell.motion.trajectory import interpolate_line
 from hexacell.noise.allowances import ReferenceChange
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.calibration import Calibration

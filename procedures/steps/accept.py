@@ -2,6 +2,7 @@
 
 from typing import ClassVar, Literal
 
+from hexacell.campaign.time_model import TimeKind
 from hexacell.errors import AnswerNeeded
 from procedures.resources.run_resources import RunResources
 from procedures.run.questions import Question, WrittenResult
@@ -28,6 +29,7 @@ class Accept(StepWithoutMotion):
     kind: Literal["accept"] = "accept"
 
     outcomes: ClassVar = (ResultAccepted,)
+    takes: ClassVar[TimeKind] = TimeKind.ASKING
     doing: ClassVar[str] = "waiting for a decision on the result"
     is_reproducible: ClassVar[bool] = False
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import ClassVar
 
 from hexacell.campaign.pilots import pilot_number
+from hexacell.campaign.time_model import TimeKind
 from hexacell.cell.fields import Frozen
 from procedures.resources.run_resources import RunResources
 from procedures.run.cancellation import in_thread
@@ -57,6 +58,7 @@ class BaseStep(Frozen, ABC):
         doing: what the run, the robot or a person does meanwhile, in a few words.
         moves_nothing: it neither moves the robot nor reads a device.
         is_reproducible: a replay can compute its failure again, unless a device or the disk caused it.
+        takes: what its time is spent on.
     """
 
     kind: str
@@ -65,6 +67,7 @@ class BaseStep(Frozen, ABC):
     doing: ClassVar[str] = ""
     moves_nothing: ClassVar[bool] = False
     is_reproducible: ClassVar[bool] = False
+    takes: ClassVar[TimeKind] = TimeKind.DECIDING
 
     @property
     def key(self) -> str:

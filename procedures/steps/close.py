@@ -4,6 +4,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from hexacell.campaign.time_model import TimeKind
 from hexacell.identification.problem.random_walk import GaugeWalk
 from hexacell.lengths import unit_of
 from hexacell.measurements.records import deviation_of
@@ -66,6 +67,7 @@ class CloseSet(StepOfSet):
     reason: str = ""
 
     outcomes: ClassVar = (SetClosed,)
+    takes: ClassVar[TimeKind] = TimeKind.READING
     doing: ClassVar[str] = "reading the reference again, for the drift"
 
     async def perform(self, run: RunResources, state: RunState) -> SetClosed:

@@ -7,6 +7,7 @@ import numpy as np
 
 from drivers.errors import PoseRefused
 from hexacell.campaign.decisions import Forecast
+from hexacell.campaign.time_model import TimeKind
 from hexacell.cell.fields import Frozen
 from hexacell.cell.model import CellSettings
 from hexacell.errors import HexacellError
@@ -142,6 +143,7 @@ class Move(StepAtPose):
     straight: bool = False
 
     outcomes: ClassVar = (Arrived, PoseExcluded)
+    takes: ClassVar[TimeKind] = TimeKind.MOVING
 
     @property
     def target(self) -> Pose:

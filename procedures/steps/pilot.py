@@ -2,6 +2,7 @@
 
 from typing import ClassVar, Literal
 
+from hexacell.campaign.time_model import TimeKind
 from hexacell.measurements.records import Record
 from procedures.resources.run_resources import RunResources
 from procedures.run.readings import Reading
@@ -32,6 +33,7 @@ class Pilot(StepAtPose):
     kind: Literal["pilot"] = "pilot"
 
     outcomes: ClassVar = (PilotTaken, RecordRejected)
+    takes: ClassVar[TimeKind] = TimeKind.READING
 
     async def perform(self, run: RunResources, state: RunState) -> PilotTaken | RecordRejected:
         reading = await read_inside(self, run, state)

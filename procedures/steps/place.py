@@ -2,6 +2,7 @@
 
 from typing import ClassVar, Literal
 
+from hexacell.campaign.time_model import TimeKind
 from hexacell.cell.model import CellSettings
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
@@ -32,6 +33,7 @@ class Place(StepOfSet):
     pose: SixNumbers
 
     outcomes: ClassVar = (GaugesPlaced,)
+    takes: ClassVar[TimeKind] = TimeKind.PLACING
     doing: ClassVar[str] = "the gauges are to be placed"
 
     async def perform(self, run: RunResources, state: RunState) -> GaugesPlaced:

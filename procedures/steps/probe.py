@@ -2,6 +2,7 @@
 
 from typing import ClassVar, Literal
 
+from hexacell.campaign.time_model import TimeKind
 from procedures.resources.run_resources import RunResources
 from procedures.run.keys import ThreeNumbers
 from procedures.run.readings import Reading
@@ -27,6 +28,7 @@ class Probe(StepOfSet):
     moved_mm: ThreeNumbers
 
     outcomes: ClassVar = (GaugesProbed,)
+    takes: ClassVar[TimeKind] = TimeKind.READING
     purpose: ClassVar[str] = "trying the gauges"
 
     async def perform(self, run: RunResources, state: RunState) -> GaugesProbed:

@@ -2,6 +2,7 @@
 
 from typing import ClassVar, Literal
 
+from hexacell.campaign.time_model import TimeKind
 from procedures.resources.run_resources import RunResources
 from procedures.run.readings import Reading
 from procedures.run.state import RunState
@@ -25,6 +26,7 @@ class Repeat(StepOfSet):
     kind: Literal["repeat"] = "repeat"
 
     outcomes: ClassVar = (ReferenceRepeated,)
+    takes: ClassVar[TimeKind] = TimeKind.READING
     purpose: ClassVar[str] = "measuring the noise"
 
     async def perform(self, run: RunResources, state: RunState) -> ReferenceRepeated:

@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import ClassVar, Literal
 
 from drivers.errors import GaugeAtEnd
+from hexacell.campaign.time_model import TimeKind
 from hexacell.errors import HexacellError, consists_only_of
 from hexacell.measurements.records import deviation_of
 from procedures.resources.run_resources import RunResources
@@ -55,6 +56,7 @@ class Revisit(StepOfSet):
     kind: Literal["revisit"] = "revisit"
 
     outcomes: ClassVar = (ReferenceConfirmed, SetInvalidated)
+    takes: ClassVar[TimeKind] = TimeKind.READING
     doing: ClassVar[str] = "reading the reference again, after an interruption"
 
     async def perform(self, run: RunResources, state: RunState) -> ReferenceConfirmed | SetInvalidated:

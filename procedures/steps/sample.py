@@ -6,6 +6,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from drivers.errors import GaugeAtEnd
+from hexacell.campaign.time_model import TimeKind
 from hexacell.cell.model import CellSettings
 from hexacell.errors import HexacellError, consists_only_of, joined
 from hexacell.kinematics.pose import Pose
@@ -69,6 +70,7 @@ class Sample(StepAtPose):
     kind: Literal["sample"] = "sample"
 
     outcomes: ClassVar = (RecordTaken, RecordRejected)
+    takes: ClassVar[TimeKind] = TimeKind.READING
     doing: ClassVar[str] = "reading, once the gauges have settled"
 
     def activity(self) -> None:

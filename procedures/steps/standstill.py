@@ -2,6 +2,7 @@
 
 from typing import ClassVar, Literal
 
+from hexacell.campaign.time_model import TimeKind
 from procedures.resources.run_resources import RunResources
 from procedures.run.keys import SetKey
 from procedures.run.readings import ReadingSeries
@@ -25,6 +26,7 @@ class Standstill(StepOfSet):
     kind: Literal["standstill"] = "standstill"
 
     outcomes: ClassVar = (StandstillRead,)
+    takes: ClassVar[TimeKind] = TimeKind.READING
     purpose: ClassVar[str] = "measuring the noise"
 
     async def perform(self, run: RunResources, state: RunState) -> StandstillRead:

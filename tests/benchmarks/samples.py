@@ -19,6 +19,7 @@ SAMPLES: dict[str, dict[str, tuple[int, int]]] = {
     "healthy_robots": {"ROBOTS": (30, 1000)},
     "long_polling": {"HOURS": (1, 24)},
     "mechanisms": {"FAULTY": (16, 100), "ROBOTS": (6, 100)},
+    "minutes": {"FIXED_PLANS": (200, 200), "MECHANISMS": (1, 4), "ROBOTS": (20, 20)},
     "motion_limits": {"CAMPAIGNS": (8, 1000), "COMPARED": (4, 6)},
     "mutations": {"MUTATIONS": (60, 10_000)},
     "paper_study": {"DRAWS": (20, 20)},

@@ -18,7 +18,7 @@ CONTROLLER = "simulated-hexaglide.controller.toml"
 QUICK = (
     ("clock_factor = 150.0", "clock_factor = 600.0"),
     ("give_up_s = 60.0", "give_up_s = 6000.0"),
-    ("orientations = 11", "orientations = 7"),
+    ("orientations = 17", "orientations = 7"),
     ("orientations = 6", "orientations = 2"),
     ("position_mm = 0.3 ", "position_mm = 20.0"),
     ("orientation_deg = 0.08", "orientation_deg = 5.0"),
@@ -60,7 +60,7 @@ SHORT = (
   [100.0, 0.0, 600.0],
   [-100.0, 100.0, 500.0],
 ]
-orientations = 11""",
+orientations = 17""",
         """points = [
   [100.0, -100.0, 500.0],
   [-100.0, 100.0, 500.0],

@@ -108,7 +108,7 @@ def test_a_real_cell_cannot_be_simulated(typed_here, cell_folder):
 @pytest.mark.parametrize(
     ("old", "new", "place", "words"),
     [
-        ("[100.0, 100.0, 550.0]", "[0.0, 0.0, 5500.0]", "5500.0", "verification point 2: leg 1"),
+        ("[100.0, 100.0, 550.0]", "[0.0, 0.0, 5500.0]", "5500.0", "verification point 3: leg 1"),
         ("poses = [", "poses = [[0.0, 0.0, 550.0, 60.0, 0.0, 0.0],", "60.0, 0.0, 0.0]", "task pose 1: "),
         (
             "[0.0, -155.0, 0.0]",

@@ -102,7 +102,7 @@ def test_several_failures_are_reported_at_once(typed_here, served, command):
     )
     text = served.cell.read_text()
     served.cell.write_text(re.sub(r"(?m)^port = \d+$", f"port = {nobody}", text))
-    words = ("gauge x", "leg 1", f"controller 127.0.0.1:{nobody}", "verification point 2")
+    words = ("gauge x", "leg 1", f"controller 127.0.0.1:{nobody}", "verification point 3")
     message = refused(typed_here, served, command, 3, *words)
     assert message.count("\n  - ") >= len(words)
     advice = "`hexacell devices` shows what is connected" in " ".join(message.split())

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-P5 = "[-100.0, 100.0, 500.0],\n]\norientations = 11"
+P5 = "[-100.0, 100.0, 500.0],\n]\norientations = 17"
 
 
 pytestmark = pytest.mark.usefixtures("never_moves")
@@ -30,11 +30,11 @@ IMPOSSIBLE: dict[str, tuple[tuple[tuple[str, str], ...], tuple[str, ...]]] = {
         ("at the worst task pose, one sigma, where the limit is 0.3", "Allow more tilt"),
     ),
     "budget": (
-        (("orientations = 11", "orientations = 11\nbudget_records = 12"),),
-        ("the budget of 12 records allows 11 records at 1 points, 30 equations for 35", "Allow 14 records"),
+        (("orientations = 17", "orientations = 17\nbudget_records = 12"),),
+        ("the budget of 12 records allows 12 records at 1 points, 33 equations for 35", "Allow 13 records"),
     ),
     "a way across a singularity": (
-        ((P5, "[111.0, 15.0, -266.0],\n]\norientations = 11"), *FREE),
+        ((P5, "[111.0, 15.0, -266.0],\n]\norientations = 17"), *FREE),
         ("identification points 4 and 5: the straight line between them", "change their order"),
     ),
 }
@@ -65,7 +65,7 @@ WIDE = (
 
 @pytest.mark.usefixtures("few_candidates", "one_robot")
 def test_the_predicted_accuracy_is_printed_before_any_motion(typed_here: Any, cell_folder: Any) -> None:
-    cell_folder.edit(("orientations = 11", "orientations = 7"), *WIDE)
+    cell_folder.edit(("orientations = 17", "orientations = 7"), *WIDE)
     before = cell_folder.snapshot()
     outcome = typed_here("preflight", cell_folder.cell, "--json")
     assert outcome.code == 0
@@ -90,7 +90,10 @@ def test_the_predicted_accuracy_is_printed_before_any_motion(typed_here: Any, ce
     assert "A healthy machine of this cell passes with a probability of 99.7%." in said
     assert "The noise of the encoders makes about 0." in said
     words = r"\d+ records at 5 points will give about 0\.\d{3} mm at the worst of your task poses"
-    assert re.search(rf"{words} \(one sigma\), in about \d+ minutes\.", said)
+    assert re.search(
+        rf"{words} \(one sigma\), in about [\d.]+ minutes: moving [\d.]+, reading [\d.]+", said
+    )
+    assert re.search(r"Sooner \(.* budget_minutes\) U would be larger: \d+ minutes \d\.\d+ mm, ", said)
     assert cell_folder.snapshot() == before
 
 
@@ -111,7 +114,7 @@ def listed(cell_folder: Any, change: Callable[[list[str]], list[str]]) -> str:
     (cell_folder.path / name).write_text(
         "point,orientation,x,y,z,a,b,c\n" + "".join(f"{row}\n" for row in change(rows))
     )
-    cell_folder.edit(("orientations = 11", f'orientations = 11\nposes = "{name}"'))
+    cell_folder.edit(("orientations = 17", f'orientations = 17\nposes = "{name}"'))
     return name
 
 
@@ -164,7 +167,7 @@ def test_a_list_of_poses_that_can_be_measured(typed_here: Any, cell_folder: Any)
 
 def test_a_list_of_poses_with_choose_points_is_refused(typed_here: Any, cell_folder: Any) -> None:
     listed(cell_folder, lambda rows: rows)
-    cell_folder.edit(("orientations = 11", "orientations = 11\nchoose_points = true"))
+    cell_folder.edit(("orientations = 17", "orientations = 17\nchoose_points = true"))
     outcome = typed_here("preflight", cell_folder.cell)
     assert outcome.code == 2
     assert "a list of poses leaves no points to choose" in outcome.err

@@ -51,7 +51,7 @@ def test_the_page_says_what_the_run_found_the_verdict_first(typed_here, demo, ru
         one.event for one in read_entries(run / "journal.jsonl") if isinstance(one.event, events.SetClosed)
     )
     drift = f"{max(map(abs, closed.drift_mm)):.3f}"
-    assert re.search(rf"\bpoint 1 11 [\d.]+ {drift} point 2 11 ", said)
+    assert re.search(rf"\bpoint 1 17 [\d.]+ {drift} point 2 17 ", said)
     for parameter in json.loads((run / "result.json").read_text())["parameters"]:
         is_free = parameter["sigma"] > 0.0
         assert (re.search(rf"\b{parameter['name']} mm -?\d", said) is not None) == is_free

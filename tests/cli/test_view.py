@@ -84,7 +84,7 @@ def test_a_run_is_seen_with_what_it_planned_measured_and_changed(typed_here, dem
     assert np.allclose(drawn[:, 0], [one.pose[:3] for one in taken], atol=1e-3)
     vectors = np.array([one.deviation_mm for one in taken])
     assert np.allclose(drawn[:, 1] - drawn[:, 0], factor * vectors, atol=1e-3)
-    assert any(name.startswith("held-out poses as left: 30") for name in named)
+    assert any(name.startswith("held-out poses as left: 21") for name in named)
     assert any(name.startswith("legs as found, differences") for name in named)
     assert typed_here("view", run, "--no-open").code == 0  # its own file is replaced
     assert len(opened) == 1

@@ -24,7 +24,7 @@ def cell_in(folder: Path) -> Path:
     text = text[:begin] + nominal.group() + text[text.index("offset = [599") :]
     for old, new in (
         ("[identification]\n", '[identification]\nidentify = ["zeros"]\n'),
-        ("orientations = 11", "orientations = 4"),
+        ("orientations = 17", "orientations = 4"),
         ("largest_change_mm = 15.0", "largest_change_mm = 99.0"),
         ("base_mm = 2.0", "base_mm = 0.01"),
         ("platform_mm = 2.0", "platform_mm = 0.01"),

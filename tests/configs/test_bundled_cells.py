@@ -30,8 +30,8 @@ def test_simulated_hexaglide_is_table_1():
     same(settings.robot.nominal, NOMINAL)
     same(settings.simulation.geometry, ACTUAL)
     np.testing.assert_array_equal(settings.identification.points, POINTS[:5])
-    assert settings.identification.orientations == 11
-    assert settings.verification.points == (tuple(POINTS[5]), (100, 100, 550), (0, -100, 600))
+    assert settings.identification.orientations == 17
+    assert settings.verification.points == (tuple(POINTS[5]), (0, -100, 600), (100, 100, 550))
     assert settings.limits.gauge_travel_mm == 5
     assert settings.tolerances.model_dump() == {"S_mm": 7, "B_mm": 7, "l_mm": 7, "ball_mm": 0}
     assert {settings.noise.encoder, settings.noise.gauge_mm} == {0.01}

@@ -115,7 +115,7 @@ def new_rig(
     source = load_cell(bundled_config("simulated-hexaglide"))
     changes = (
         SMALL
-        | {"timing.interval_s": 0.15}
+        | {"timing.interval_s": 0.15, "simulation.seed": 7}  # few records, whose error is clearly seen
         | {key.replace("__", "."): value for key, value in changes.items()}
     )
     path = folder / "cell.toml"

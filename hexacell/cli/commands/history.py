@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from hexacell.cell.loader import Cell
+from hexacell.cell.loader import Cell, load_cell
 from hexacell.cli.commands.cell import archive_url, cell_at
 from hexacell.cli.commands.status import fleet_history_text
 from hexacell.cli.console import Console
@@ -19,8 +19,12 @@ from hexacell.services.history.run_index import RunIndex
 from hexacell.services.write_back.config_history import ConfigWrite, config_history
 from hexacell.text.config_changes import NO_WRITES, write_text
 from hexacell.text.history import comparison_text, drift_text, history_text, retention_text, watch_text
+from hexacell.text.layout import wrapped
 from hexacell.text.line_face import run_story, story_text
+from hexacell.text.time_spent import spent_sentence
 from procedures.journal.journal import read_entries
+from procedures.journal.time_spent import time_spent
+from procedures.run.state import fold
 
 MOST_DAYS = 36525.0
 
@@ -40,11 +44,16 @@ def main(options: argparse.Namespace, console: Console) -> ExitCode:
         entries = read_entries(run.journal)
         if not entries:
             raise UsageError("nothing happened in this run", subject=run.path, action="Name another")
+        settings = load_cell(run.cell_file).settings
+        spent = time_spent(entries, settings.timing)
         told = [
             {"line": entry.number, "at": entry.at, "kind": entry.event.kind, "text": text}
             for entry, text in run_story(entries)
         ]
-        console.show({"events": told}, story_text(entries))
+        begun = fold(entry.event for entry in entries).started
+        mode = "" if begun is None else begun.mode
+        text = f"{story_text(entries)}\n{wrapped(spent_sentence(spent, settings, mode))}"
+        console.show({"events": told, "seconds": spent}, text)
     elif options.keep is not None:
         _keep(cell, options, console)
     elif options.changes:

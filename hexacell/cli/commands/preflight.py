@@ -48,6 +48,7 @@ def main(options: argparse.Namespace, console: Console) -> ExitCode:
     trial = try_plan(cell)
     expected = {
         **asdict(trial.result),
+        "minutes": trial.result.minutes,
         "averaging": trial.averaging,
         "encoders_part_mm": trial.encoders_part_mm,
         "lost": trial.unreachable,

@@ -7,6 +7,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from hexacell.campaign.time_model import Seconds
 from hexacell.cell.loader import load_cell
 from hexacell.cell.model import CellSettings
 from hexacell.config.change import AFTER, BEFORE
@@ -15,6 +16,7 @@ from hexacell.runs.run_folder import CELL_FILE, MEASUREMENTS, RESULT, RunFolder
 from hexacell.services.history.journal_soundness import read_sound
 from hexacell.storage import atomic_files
 from hexacell.storage.output_files import RUN_JOURNAL
+from procedures.journal.time_spent import time_spent
 from procedures.run.state import RunState
 from procedures.steps import events
 
@@ -31,6 +33,7 @@ class ReportedRun:
     Attributes:
         settings: the cell file as it was when the run began.
         began, ended: when its first and last event were written, UTC.
+        spent: what the time in between was spent on.
         document: the identification as ``fit --json`` has it; empty without one.
         fingerprints: SHA-256 of the files of the folder, by their names.
     """
@@ -41,6 +44,7 @@ class ReportedRun:
     started: events.RunStarted
     began: datetime
     ended: datetime
+    spent: Seconds
     document: Mapping[str, Any]
     fingerprints: Mapping[str, str]
 
@@ -82,6 +86,7 @@ def reported_run(run: Path) -> ReportedRun:
         started=state.started,
         began=entries[0].at,
         ended=entries[-1].at,
+        spent=time_spent(entries, settings.timing),
         document=_document(folder.result),
         fingerprints={
             name: atomic_files.sha256(data) for name, data in contents.items() if data is not None

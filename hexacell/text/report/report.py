@@ -14,6 +14,7 @@ from hexacell.text.report import results, statement
 from hexacell.text.report.pages import Chapter, Facts, Paragraph, Picture, Report, Table, Tone
 from hexacell.text.report.statement import NOT_STATED
 from hexacell.text.robot import robot_picture
+from hexacell.text.time_spent import spent_sentence
 from procedures.run.readings import temperatures_shown
 
 TITLES = {
@@ -74,11 +75,12 @@ def conditions_chapter(run: ReportedRun) -> Chapter:
     """Temperatures, records and noise."""
     state = run.state
     pairs = [("Records", str(sum(len(measured.samples) for measured in state.sets.values())))]
+    pairs.append(("Time", spent_sentence(run.spent, run.settings, run.started.mode)))
     pairs += [
         (f"Temperature, {name}", f"{lowest:.1f} to {highest:.1f} deg C")
         for name, (lowest, highest) in temperature_ranges(run).items()
     ]
-    if len(pairs) == 1:
+    if not temperature_ranges(run):
         pairs.append(("Temperature", "not measured"))
     pairs += [("Sets measured again", str(state.invalidated))] if state.invalidated else []
     noise = () if state.noise is None else measured_noise_sentences(state.noise.noise)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from statistics import median
 
-from hexacell.campaign.budget import TimeModel
+from hexacell.campaign.time_model import TimeModel
 from hexacell.cell.model import CellSettings
 from hexacell.lengths import from_to
 from hexacell.results.result import RecordResidual
@@ -92,8 +92,8 @@ def _minutes(picture: RunPicture, settings: CellSettings | None, left: int) -> f
     if settings is None:
         return left * median(gaps) if gaps else None
     stated = TimeModel.of(settings)
-    a_reading = median(gaps) if gaps else stated.record_seconds / 60.0
-    return left * a_reading + _stations_left(picture, settings) * stated.point_minutes
+    a_reading = median(gaps) if gaps else stated.record_s / 60.0
+    return left * a_reading + _stations_left(picture, settings) * stated.place_s / 60.0
 
 
 def _stations_left(picture: RunPicture, settings: CellSettings) -> int:

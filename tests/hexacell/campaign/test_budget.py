@@ -6,17 +6,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.campaign.budget import (
-    MOST_SHARE,
-    MOVE_OVERHEAD_S,
-    Budget,
-    TimeModel,
-    shared_sizes,
-    usual_move_seconds,
-)
+from hexacell.campaign.budget import MOST_SHARE, Budget, paid_sizes, shared_sizes
 from hexacell.campaign.decisions import CampaignState
+from hexacell.campaign.time_model import MOVE_OVERHEAD_S, TimeModel
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.motion.durations import SpeedLimits, line_duration
+
+SLOW = SpeedLimits(joint=25.0, edge_mm_s=25.0)
+TIMES = TimeModel(
+    place_s=300.0, trial_s=5.0, station_s=30.0, reading_s=1.0, move_s=29.0, wide_move_s=9.0, speeds=SLOW
+)
 
 
 @pytest.mark.parametrize(
@@ -35,35 +35,43 @@ from hexacell.measurements.records import MeasurementSet, Record
     ],
 )
 def test_the_tighter_of_records_and_minutes_holds(most_records, most_minutes, records, stations, left):
-    """Minutes are those after points of 5 minutes, and after references that are read again."""
-    budget = Budget(most_records, most_minutes, TimeModel(5.0, 30.0))
-    assert budget.records_left(records, stations) == left
+    """Minutes are those after points of 5 minutes, and after going to and trying gauges there."""
+    assert Budget(most_records, most_minutes).records_left(records, stations, TIMES) == left
+    if most_minutes is not None:
+        later = Budget(most_records, most_minutes + 3.0, reserved=3.0)
+        assert later.records_left(records, stations, TIMES) == left
 
 
 def test_durations_of_a_cell(make_plan):
     by_hand = {"stations__placement": "by-hand", "identification__minutes_per_station": 7.0}
-    assert TimeModel.of(make_plan(**by_hand).settings).point_minutes == 7.0
-    assert TimeModel.of(make_plan().settings).point_minutes == 0.0, "fixed gauges are not carried"
-    timing = {"timing__move_s": 2.0, "timing__window_s": 1.0}
-    seconds = [
-        TimeModel.of(make_plan(**timing, **others).settings).record_seconds
-        for others in ({"identification__poses": "list.csv"}, {"identification__provisional": True}, {})
-    ]
-    assert seconds[0] == 3.0
-    assert seconds[0] < seconds[1] < seconds[2] < 12.0, "stops on the way are moves as well"
-    stated = make_plan(identification__seconds_per_record=9.0)
-    assert TimeModel.of(stated.settings).record_seconds == 9.0
-
-
-def test_a_move_takes_as_long_as_its_largest_speeds_let_it(make_plan):
+    assert TimeModel.of(make_plan(**by_hand).settings).place_s == 420.0
+    fixed = TimeModel.of(make_plan().settings)
+    assert fixed.place_s == 0.0, "fixed gauges are not carried"
+    untried = TimeModel.of(make_plan(stations__trial_mm=0.0).settings)
+    assert untried.trial_s == 0.0
+    assert fixed.station_s == pytest.approx(untried.station_s + fixed.trial_s)
     slow, fast = (
-        usual_move_seconds(
-            make_plan(speed__joint_at_gauges=speed, speed__edge_at_gauges_mm_s=speed).settings
-        )
+        TimeModel.of(make_plan(speed__joint_at_gauges=speed, speed__edge_at_gauges_mm_s=speed).settings)
         for speed in (10.0, 40.0)
     )
-    assert slow - MOVE_OVERHEAD_S == pytest.approx(4.0 * (fast - MOVE_OVERHEAD_S))
-    assert usual_move_seconds(make_plan(timing__move_s=2.5).settings) == 2.5
+    assert slow.move_s - MOVE_OVERHEAD_S == pytest.approx(4.0 * (fast.move_s - MOVE_OVERHEAD_S))
+
+
+def test_ways_between_records_say_how_long_the_next_ones_take(make_plan):
+    plan = make_plan()
+    robot, times = plan.robot, TimeModel.of(plan.settings)
+    poses = [Pose(0.0, 0.0, 550.0, 6.0 * (number % 2)) for number in range(12)]
+    joints = robot.mechanism.inverse(robot.controller, robot.branch, robot.from_commands(poses))
+    records = [
+        Record(1, number + 1, pose, tuple(row), (0.0, 0.0, 0.0))
+        for number, (pose, row) in enumerate(zip(poses, joints.tolist(), strict=True))
+    ]
+    assert times.after(robot, records[:4]) == times, "too few"
+    between = times.after(robot, records)
+    assert between.reading_s == times.reading_s
+    start, end = poses[:2]
+    exact = line_duration(robot.mechanism, robot.controller, robot.branch, start, end, times.speeds)
+    assert between.move_s == pytest.approx(exact + MOVE_OVERHEAD_S, rel=0.1)
 
 
 PLANNED = {1: 11, 2: 11, 3: 11, 4: 11, 5: 11}
@@ -116,3 +124,14 @@ def test_no_point_gets_fewer_than_planned_and_all_together_no_more(counts, done,
     taken = sum(state.records_at(point) for point in set(PLANNED) - waiting)
     planned = sum(PLANNED[point] for point in waiting)
     assert asked == planned or asked + taken <= sum(PLANNED.values())
+
+
+def test_minutes_are_shared_by_the_points_that_are_not_done():
+    minutes = 5.0 * 5.5 + 45 * 0.5
+    budget = Budget(None, minutes)
+    assert paid_sizes(PLANNED, measured({}, set()), frozenset(), budget, TIMES) == dict.fromkeys(PLANNED, 9)
+    later = paid_sizes(PLANNED, measured({1: 20, 2: 3}, {1}, 2), frozenset({5}), budget, TIMES)
+    assert (later[1], later[5]) == (11, 11), "what is done or out of reach keeps its plan"
+    assert later[2] == later[3] == later[4] > 9, "a point less is to be gone to"
+    cost = sum(later[point] for point in (2, 3, 4)) * 0.5 + 20 * 0.5 + 4 * 5.5
+    assert cost <= minutes

@@ -130,6 +130,6 @@ def test_an_effect_that_was_measured_before_has_its_value_in_the_errors(unchange
     known = replace(check, effects=(replace(scale, value=1000.0),))
     stated = said(known, state.measurements)
     (line,) = known.plan.task.budget(stated.estimate.identification, stated.estimate.belief, [scale]).lines
-    assert plain.errors.position.value < 0.03
+    assert plain.errors.position.value < 0.04
     assert stated.errors.position.value == pytest.approx(1000.0 * line.per_unit_mm, abs=0.05)
-    assert stated.errors.position.expanded == pytest.approx(plain.errors.position.expanded, rel=0.3)
+    assert stated.errors.position.expanded == pytest.approx(plain.errors.position.expanded, rel=0.6)

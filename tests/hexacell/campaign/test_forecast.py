@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.campaign.budget import usual_move_seconds
 from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.forecast import PlannedInformation
 from hexacell.campaign.task_accuracy import planned_budget
+from hexacell.campaign.time_model import TimeKind, seconds_beside
 from hexacell.cell.uncertainty import UncertaintySettings
 from hexacell.config.interface import ControllerGeometry
 from hexacell.design.criteria import add_information
@@ -205,16 +205,23 @@ def test_systematic_effects_widen_the_expanded_uncertainty(result):
 
 
 def test_minutes_are_of_everything_that_is_measured(result):
-    """Held-out poses are reached on straight lines."""
     plan = at_two_points(**SEED)
-    timing, move_s = plan.settings.timing, usual_move_seconds(plan.settings)
-    poses = 3 * (6 + 1) + 3 * (6 + 5 + 1)
-    held_out = poses * (move_s + timing.window_s) / 60.0
-    noise = (
-        40 * 0.1 + (14 + 1 + 6) * move_s + (14 + 6) * 0.6
-    ) / 60.0  # to pilot poses, once beside, and back
-    records = plan.budget.time_model.minutes(result.records, 2)
-    assert result.minutes == pytest.approx(noise + records + held_out)
+    beside, least = seconds_beside(plan.settings), result.records * plan.settings.timing.window_s
+    assert result.seconds[TimeKind.READING] >= beside[TimeKind.READING] + least
+    assert result.seconds[TimeKind.MOVING] > beside[TimeKind.MOVING]
+    assert result.seconds[TimeKind.PLACING] == 0.0
+    assert result.minutes == pytest.approx(sum(result.seconds.values()) / 60.0)
+    by_hand = dry_run(at_two_points(**SEED, stations__placement="by-hand"))
+    placing_s = by_hand.seconds[TimeKind.PLACING]
+    assert placing_s == (2 + 2 * 3) * 60.0 * plan.settings.identification.minutes_per_station
+
+
+def test_the_course_is_what_fewer_minutes_would_have_given(result):
+    minutes, errors = zip(*result.course, strict=True)
+    assert list(minutes) == sorted(minutes)
+    assert minutes[-1] < result.minutes < 1.1 * minutes[-1]
+    assert errors[0] > 3.0 * errors[-1]
+    assert result.expanded_mm == pytest.approx(errors[-1], rel=0.5)
 
 
 def test_robots_that_cannot_be_measured_do_not_count():

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from hexacell.campaign.decisions import CampaignState, StartPoint
-from hexacell.campaign.pilots import CAUTION, FIRST_PILOT, are_counted, pilot_number, with_pilots
+from hexacell.campaign.pilots import (
+    CAUTION,
+    FIRST_PILOT,
+    MOST_PILOTS,
+    are_counted,
+    pilot_number,
+    with_pilots,
+)
 from hexacell.campaign.stopping_rules import StoppingRules
 from hexacell.identification.estimator import estimate_online
 from hexacell.measurements.records import MeasurementSet
@@ -28,7 +35,7 @@ def before(state: CampaignState, pilots: int) -> CampaignState:
 def test_they_follow_the_reference_of_their_point(campaign) -> None:
     end = campaign[-1].state
     ids = [record.id for record in end.steering.records]
-    assert ids[:15] == [(1, 1), *((1, FIRST_PILOT + number) for number in range(14))]
+    assert ids[: 1 + MOST_PILOTS] == [(1, 1), *((1, FIRST_PILOT + number) for number in range(MOST_PILOTS))]
     assert [one for one in ids if one[1] < FIRST_PILOT] == [one.id for one in end.measurements.records]
     assert [pilot_number(orientation) for _, orientation in ids[:3]] == [None, 1, 2]
 
@@ -42,12 +49,12 @@ def test_without_their_reference_they_mean_nothing(campaign) -> None:
 
 def test_they_are_chosen_as_if_the_noise_were_larger_than_stated(two_points, at_first) -> None:
     """What a pose would show is as uncertain as by a robot with so much noise."""
-    state = before(at_first, 6)
+    state = before(at_first, 4)
     cautious = two_points.pilot_pose(state)
     noisier = replace(two_points.robot, noise=two_points.robot.noise.scaled(CAUTION))
     same = replace(two_points, robot=noisier, estimator=None).decide(state)
     assert cautious.pose == same.pose
-    assert cautious.orientation == FIRST_PILOT + 6
+    assert cautious.orientation == FIRST_PILOT + 4
     assert two_points.decide(state).pose != cautious.pose
 
 
@@ -73,7 +80,7 @@ def test_a_robot_that_is_well_known_needs_none(make_plan, paper) -> None:
 def test_the_first_record_may_turn_far_by_what_they_tell(two_points, at_first) -> None:
     reference = at_first.measurements.records[0].pose
     by_all, by_none = (
-        reference.angle_to(two_points.decide(before(at_first, count)).pose) for count in (12, 0)
+        reference.angle_to(two_points.decide(before(at_first, count)).pose) for count in (6, 0)
     )
     assert by_none < np.radians(5.0)
     assert by_all > 2.0 * by_none

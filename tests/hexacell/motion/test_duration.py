@@ -14,14 +14,16 @@ from hexacell.cell.loader import load_cell
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.limits.leg_limits import LegLimits
-from hexacell.motion.path_check import is_clear, stands_within_limits
-from hexacell.motion.trajectory import (
+from hexacell.motion.durations import (
     SHORTEST_S,
     SpeedLimits,
-    interpolate_line,
+    approximate_durations,
     line_duration,
-    shortest_duration,
+    line_durations,
+    shortest_durations,
 )
+from hexacell.motion.path_check import is_clear, stands_within_limits
+from hexacell.motion.trajectory import interpolate_line
 from hexacell.robot.model import robot_of
 
 ROBOT = robot_of(load_cell(bundled_config("simulated-hexaglide")))
@@ -62,14 +64,33 @@ def test_a_move_to_where_the_robot_is_has_a_duration_and_poses_out_of_reach_do_n
     line = interpolate_line(PoseBatch.of([HOME]), PoseBatch.of([Pose(10.0, 0.0, 550.0)]), 4)
     joints = np.zeros((5, 6))
     joints[2, 3] = np.nan
-    assert shortest_duration(joints, line.positions[:, None], SpeedLimits(1.0, 10.0)) == pytest.approx(1.0)
+    way = joints[:, None], line.positions[:, None, None]
+    assert shortest_durations(*way, SpeedLimits(1.0, 10.0)) == pytest.approx(1.0)
 
 
 def test_a_way_with_one_fast_piece_is_slow_as_a_whole() -> None:
     """A controller that is told a duration passes all pieces in the same time."""
     joints = np.cumsum([np.full(6, step) for step in (0.0, 1.0, 1.0, 10.0, 1.0)], axis=0)
-    still = np.zeros((5, 1, 3))
-    assert shortest_duration(joints, still, SpeedLimits(5.0, 1.0)) == pytest.approx(4 * 10.0 / 5.0)
+    still = np.zeros((5, 1, 1, 3))
+    assert shortest_durations(joints[:, None], still, SpeedLimits(5.0, 1.0)) == pytest.approx(
+        4 * 10.0 / 5.0
+    )
+
+
+def test_durations_by_the_ends_alone_are_near_those_of_the_whole_way() -> None:
+    random = np.random.default_rng(3)
+    turns = random.uniform(-20.0, 20.0, (40, 3))
+    poses = [Pose(0.0, 0.0, 550.0, *turn) for turn in turns.tolist()]
+    batch, home = PoseBatch.of(poses), PoseBatch.of([HOME])
+    joints, at_home = (Hexaglide().inverse(ROBOT.controller, ROBOT.branch, one) for one in (batch, home))
+    start, ends = (home, at_home), (batch, joints)
+    about = approximate_durations(Hexaglide(), ROBOT.controller, start, ends, LIMITS)
+    exact = np.array([duration_of(HOME, pose, LIMITS) for pose in poses])
+    assert (about < 1.01 * exact).all()
+    assert (about > 0.55 * exact).all()
+    assert np.mean(about / exact) > 0.8
+    several = line_durations(Hexaglide(), ROBOT.controller, ROBOT.branch, home[[0] * 40], batch, LIMITS)
+    assert several == pytest.approx(exact)
 
 
 COMMANDS = PoseBatch.of(

@@ -2,11 +2,13 @@
 
 import json
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from hexacell.campaign.decisions import Forecast
+from hexacell.campaign.time_model import TimeKind
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.measuring import AcceptanceSettings
 from hexacell.cli.app import main
@@ -36,14 +38,14 @@ def test_errors_of_micrometres_are_in_um():
 
 
 def lines(target_mm=None, **changes):
-    values = {
+    values: dict[str, Any] = {
         "drawn": 3,
         "robots": 2,
         "points": 5,
         "records": 55,
         "outside": 0,
         "worst_sigma_mm": 0.0214,
-        "minutes": 40.2,
+        "seconds": {TimeKind.MOVING: 2000.0, TimeKind.READING: 412.0, TimeKind.ASKING: 0.0},
     }
     return [
         *plan_trial_lines(PlanTrial(DryRunResult(**(values | changes)), {1: 0.0, 2: 0.0625}, target_mm))

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.interfaces import EncoderSample
-from hexacell.campaign.budget import TimeModel
 from hexacell.campaign.decisions import Forecast
+from hexacell.campaign.time_model import TimeModel
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.cell.recovery import Action, FailureKind
@@ -123,7 +123,7 @@ def test_the_time_that_is_left_follows_from_the_pace_and_from_people() -> None:
     bundled = load_cell(bundled_config("simulated-hexaglide")).settings
     stations = bundled.stations.model_copy(update={"placement": "by-hand"})
     settings = bundled.model_copy(update={"stations": stations})
-    by_hand = TimeModel.of(settings).point_minutes
+    by_hand = TimeModel.of(settings).place_s / 60.0
     visits = len(settings.identification.points) + 2 * len(settings.verification.points)
     assert by_hand > 0.0
     minutes = round(10.0 + (visits - 1) * by_hand)

@@ -33,7 +33,7 @@ async def test_a_gate_that_requires_approval_ends_an_unattended_run(recording, r
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"tolerances__l_mm": 2.0}, r"Beyond the drawing's tolerance: .*l"),
+        ({"tolerances__l_mm": 1.0}, r"Beyond the drawing's tolerance: .*l"),
         ({"acceptance__largest_change_mm": 3.0}, r"largest change is \d\.\d+ mm, .*\(limit .* 3 mm\)"),
     ],
 )

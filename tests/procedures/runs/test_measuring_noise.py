@@ -110,12 +110,10 @@ def test_the_reference_is_left_for_pilot_poses(quiet: Rig) -> None:
     history = read_journal(quiet.folder.journal)
     kinds = [event.kind for event in history if event.kind in {"piloted", "repeated"}]
     departures = "".join("." if kind == "piloted" else " " for kind in kinds).removesuffix(" ").split(" ")
-    assert departures[:2] == ["..."] * 2
-    assert max(map(len, departures)) == 3, "fewer where no further one is safe from there"
-    assert len(departures) == 6
+    assert departures == [*["..."] * 2, "", "", "", ""]
     reference = Pose(*happened(quiet, events.RecordTaken)[0].pose)
     turned = [reference.angle_to(Pose(*one.pose)) for one in pilots]
-    assert np.mean(turned[6:]) > 2.0 * np.mean(turned[:3])
+    assert np.mean(turned[3:]) > 2.0 * np.mean(turned[:3])
     state = fold(history)
     assert len(state.pilots) == len(pilots)
     travel = quiet.cell.settings.limits.gauge_travel_mm
@@ -202,7 +200,7 @@ async def test_records_are_means_of_several_windows_where_that_is_needed_and_pay
 )
 async def test_interrupted_anywhere_it_is_measured_once(make_rig, few_candidates, tmp_path, end, step):
     """After a stop, and after a death that leaves no word, at some events until the noise is measured."""
-    for number in range(step, 110, 2 * step):
+    for number in range(step, 80, 2 * step):
         folder = tmp_path / f"{number}"
         folder.mkdir()
         rig = new_rig(folder, **ASKED)

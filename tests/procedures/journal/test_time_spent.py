@@ -1,0 +1,61 @@
+"""What the time of a run was spent on, by the lines of its journal."""
+
+from datetime import UTC, datetime
+
+import pytest
+
+from hexacell.campaign.time_model import TimeKind
+from hexacell.cell.measuring import TimingSettings
+from hexacell.cell.recovery import Action, FailureKind
+from procedures.journal.journal import Entry
+from procedures.journal.time_spent import time_spent
+from procedures.run.keys import Phase, SetKey
+from procedures.steps import events
+
+AT = SetKey(phase=Phase.IDENTIFY, point=1)
+POSE = (0.0, 0.0, 550.0, 0.0, 0.0, 0.0)
+MOVE = events.StepBegun(step=events.Move(at=AT, orientation=2, pose=POSE))
+SAMPLE = events.StepBegun(step=events.Sample(at=AT, orientation=2, pose=POSE))
+PLACE = events.StepBegun(step=events.Place(at=AT, pose=POSE))
+ARRIVED = events.Arrived(at=AT, orientation=2, pose=POSE)
+REJECTED = events.RecordRejected(at=AT, orientation=2, reason="outside")
+ASKED = events.Failed(
+    step=None, failure=FailureKind.GAUGE_SILENT, attempt=1, reason="silent", action=Action.ASK
+)
+
+
+def spent(*told: tuple[float, events.Event], **timing: float) -> dict[TimeKind, object]:
+    """Of events at some seconds; only what is not 0."""
+    now = datetime.now(UTC)
+    entries = [Entry(number, now, at_s, event) for number, (at_s, event) in enumerate(told, start=1)]
+    every = time_spent(entries, TimingSettings(window_s=0.6, **timing))
+    assert set(every) == set(TimeKind)
+    return {kind: pytest.approx(seconds) for kind, seconds in every.items() if seconds}
+
+
+def test_each_step_is_of_its_kind_and_what_is_between_is_deciding() -> None:
+    found = spent(
+        (0.0, MOVE), (5.0, ARRIVED), (5.2, SAMPLE), (6.5, REJECTED), (6.6, PLACE), (66.6, ARRIVED)
+    )
+    assert found == {
+        TimeKind.MOVING: 5.0,
+        TimeKind.DECIDING: 0.3,
+        TimeKind.READING: 0.6,
+        TimeKind.SETTLING: 0.7,
+        TimeKind.PLACING: 60.0,
+    }
+
+
+def test_a_person_who_is_waited_for_is_asked() -> None:
+    found = spent((0.0, events.Paused()), (30.0, events.Resumed()), (30.5, ASKED), (90.5, MOVE))
+    assert found == {TimeKind.ASKING: 90.0, TimeKind.DECIDING: 0.5}
+
+
+def test_what_is_between_two_programs_is_not_of_the_run() -> None:
+    ended = events.Interrupted(reason="a power cut", exit_code=130)
+    assert spent((0.0, MOVE), (2.0, ended), (5000.0, MOVE), (1.0, ARRIVED)) == {TimeKind.MOVING: 2.0}
+
+
+def test_a_fast_clock_counts_for_the_machine_alone() -> None:
+    found = spent((0.0, MOVE), (0.1, ARRIVED), (0.2, SAMPLE), (0.26, REJECTED), clock_factor=10.0)
+    assert found == {TimeKind.MOVING: 1.0, TimeKind.DECIDING: 0.1, TimeKind.READING: 0.6}

@@ -70,9 +70,7 @@ figures: venv
 		.venv/bin/hexacell view configs/$$cell.toml --output docs/robot-$$cell.svg --no-open; done
 	rm -rf build/study
 	.venv/bin/hexacell study paper --folder build/study
-	.venv/bin/hexacell study design --folder build/study
 	cp build/study/paper.svg docs/study-paper.svg
-	cp build/study/design.svg docs/study-design.svg
 	$(RUN) docs.minutes
 	$(RUN) tests.benchmarks.figures
 

@@ -10,19 +10,15 @@ from typing import Any
 from hexacell.errors import UsageError
 from hexacell.study.tasks import processes, run_study
 
-STUDIES = {
-    "paper": ("paper_simulation", "PAPER"),
-    "experiment": ("paper_experiment", "EXPERIMENT"),
-    "design": ("design_study", "DESIGN"),
-}
+STUDIES = {"paper": ("paper_simulation", "PAPER"), "experiment": ("paper_experiment", "EXPERIMENT")}
 
 
 def study(name: str, draws: int, *, folder: Path | str | None = None, workers: int = 1) -> Any:  # noqa: ANN401 - a dataclass, as the study has it
     """What a study on simulated robots found, in the fields of ``hexacell study --json``.
 
     Args:
-        name: ``paper``, ``experiment`` or ``design``.
-        draws: number of robots, or of draws of the noise.
+        name: ``paper`` or ``experiment``.
+        draws: number of draws of the orientations and the noise.
         folder: where results are kept, so that it goes on where it was; by default a new temporary one.
         workers: 1 computes in this process, more in processes of their own, which import a script anew.
     """

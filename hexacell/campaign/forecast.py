@@ -9,7 +9,7 @@ complement:
 """
 
 import math
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -102,23 +102,18 @@ class Forecaster:
                 records, points = records + more, points + (not is_begun)
         return planned
 
-    def rank_points(
-        self, state: CampaignState, belief: RobotBelief, points: Sequence[int]
-    ) -> tuple[Mapping[int, float], int]:
-        """What a record at each of some points is expected to take off the worst error, mm.
-
-        And the point that takes most off the mean square error per minute.
-        """
+    def best_point(self, state: CampaignState, belief: RobotBelief, points: Sequence[int]) -> int:
+        """Which of some points takes most off the mean square error at the task poses in a minute."""
         if (error := self.task.error(belief)) is None:
-            return dict.fromkeys(points, math.inf), points[0]
+            return points[0]
         error = TaskError(error.jacobian)  # that of all parameters, which records improve whatever is held
         information = PlannedInformation.of(self.sets_at(points), belief)
-        gains, rates = dict[int, float](), dict[int, float]()
-        for point in points:
-            options = self._options(state, belief.joint_covariance, information, error, point)
-            gains[point] = max((gain for gain, _ in options), default=0.0)
-            rates[point] = max((rate for _, rate in options), default=-math.inf)
-        return gains, max(points, key=rates.__getitem__)
+        covariance = belief.joint_covariance
+        rates = [
+            max(self._rates(state, covariance, information, error, point), default=-math.inf)
+            for point in points
+        ]
+        return points[int(np.argmax(rates))]
 
     def predicted_belief(self, belief: RobotBelief, state: CampaignState) -> RobotBelief:
         """What will be known once everything that is still planned is measured."""
@@ -143,29 +138,21 @@ class Forecaster:
         every = enumerate(self.planned_sets(), start=1)
         return [poses if point in points else poses[:0] for point, poses in every]
 
-    def _options(
+    def _rates(
         self,
         state: CampaignState,
         covariance: Array,
         information: "PlannedInformation",
         error: TaskError,
         point: int,
-    ) -> list[tuple[float, float]]:
-        """What different numbers of records at a point would gain.
-
-        For each number, what a record takes off the worst error, mm, and all of them off the mean square a
-        minute.
-        """
-        is_begun = state.point == point
+    ) -> Iterator[float]:
+        """What different numbers of records at a point would take off the mean square, mm^2 a minute."""
+        is_begun, times = state.point == point, self.times(state)
         most = self._most(state, point, len(state.measurements), state.begun_points)
-        sizes = sorted({min(size, most) for size in SET_SIZES} - ({0} if is_begun else {0, 1}))
-        options, times = [], self.times(state)
-        for size in sizes:
+        for size in sorted({min(size, most) for size in SET_SIZES} - ({0} if is_begun else {0, 1})):
             after = add_information(covariance, information.added(state, point, size))
-            minutes = times.minutes(size, 0 if is_begun else 1)
-            gain = (error.worst(covariance) - error.worst(after)) / size
-            options.append((gain, (error.mean_square(covariance) - error.mean_square(after)) / minutes))
-        return options
+            gained = error.mean_square(covariance) - error.mean_square(after)
+            yield gained / times.minutes(size, 0 if is_begun else 1)
 
     def _most(self, state: CampaignState, point: int, records: int, points: int) -> int:
         """How many more records a point may get after some records at some points."""

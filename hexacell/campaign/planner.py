@@ -292,30 +292,18 @@ class Plan:
         safe = self._safe(state, [point for point in self.points if point not in state.done])
         if not safe:
             return decisions.Finished("none of the remaining points can be reached safely")
-        worthwhile = self._worthwhile(state, self._reachable(state, safe) or safe)
-        if not worthwhile:
-            least = self.settings.identification.least_gain_mm
-            return decisions.Finished(f"no record would gain {least:g} mm at the task poses")
-        return self._start(worthwhile[0])
-
-    def _worthwhile(self, state: decisions.CampaignState, points: list[int]) -> list[int]:
-        """The points that gain enough, the next one first."""
-        plan = self.settings.identification
-        if not plan.least_gain_mm and not plan.choose_points:
-            return points
-        gains_mm, best = self.forecaster.rank_points(state, self.estimate(state).belief, points)
-        worthwhile = [point for point in points if gains_mm[point] >= plan.least_gain_mm]
-        return [best] if plan.choose_points and best in worthwhile else worthwhile
+        points = self._reachable(state, safe) or safe
+        if not self.settings.identification.choose_points:
+            return self._start(points[0])
+        return self._start(self.forecaster.best_point(state, self.estimate(state).belief, points))
 
     def _at_point(self, state: decisions.CampaignState, point: int) -> decisions.Decision:
         if reason := self._stopping.end_of_point(state, point):
             return decisions.FinishPoint(point, reason)
         try:
-            proposed = self._next_pose(state, point)
+            return self._next_pose(state, point)
         except LimitError as error:
             return decisions.FinishPoint(point, error.problem)
-        reason = self._stopping.little_gain(proposed)
-        return decisions.FinishPoint(point, reason) if reason else proposed
 
     def _next_pose(self, state: decisions.CampaignState, point: int) -> decisions.MeasurePose:
         estimate = self.estimate(state)

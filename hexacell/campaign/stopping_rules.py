@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-from hexacell.campaign.decisions import CampaignState, MeasurePose
+from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.forecast import Forecaster
 from hexacell.campaign.online_estimate import RecordEstimator
 from hexacell.campaign.pilots import are_counted
@@ -59,18 +59,6 @@ class StoppingRules:
             return self.goal.reached_at(point, state.measurements)
         return self._target_reached(state) or self._another_point(state, point)
 
-    def little_gain(self, proposed: MeasurePose) -> str | None:
-        """Why a proposed record is not worth its time.
-
-        None with zeros alone: what is held makes most of the error, and no record lowers that.
-        """
-        if self.forecaster.task.held is not None:
-            return None
-        least, forecast = self.settings.identification.least_gain_mm, proposed.forecast
-        if forecast is None or forecast.now_mm - forecast.next_mm >= least:
-            return None
-        return f"no record here would gain {least:g} mm at the task poses"
-
     def _budget_used(self, state: CampaignState, *, points: int, records: int) -> str | None:
         """Whether so many more points and records cannot be afforded, in words."""
         budget = self.forecaster.budget
@@ -99,5 +87,5 @@ class StoppingRules:
         if not self.settings.identification.choose_points or not others:
             return None
         belief = self.estimator(state.steering).belief
-        _, best = self.forecaster.rank_points(state, belief, [point, *others])
+        best = self.forecaster.best_point(state, belief, [point, *others])
         return None if best == point else f"point {best} gains more in the same time"

@@ -60,9 +60,6 @@ class IdentificationSettings(Section):
     target_mm: Positive | None = key(
         None, "predicted error at every task pose, mm, 1 sigma, below which measuring is done"
     )
-    least_gain_mm: NotNegative = key(
-        0.0, "gain in that error below which no further record is worth its time, mm"
-    )
     budget_records: int | None = key(None, "most records, references included", ge=2, le=MOST_RECORDS)
     budget_minutes: Positive | None = key(
         None, "duration of the whole run, minutes; it decides how many records the points get"

@@ -255,7 +255,6 @@ def check_settings(settings: CellSettings, budget: int) -> CellSettings:
             "budget_records": budget,
             "budget_minutes": None,
             "target_mm": None,
-            "least_gain_mm": 0.0,
             "choose_points": False,
             "provisional": False,
         }

@@ -150,7 +150,7 @@ class VirtualCampaign:
 
     def _take(self, decision: decisions.StartPoint | decisions.MeasurePose) -> Record | None:
         """The record at the pose of a decision; None where the ball left the gauges' travel."""
-        self.seconds[TimeKind.READING] += self.plan.settings.timing.window_s
+        self.seconds[TimeKind.READING] += TimeModel.of(self.plan.settings).reading_s
         record = self.virtual_robot.measure(decision.point, decision.orientation)
         self.state = replace(self.state, present=decision.pose)
         if self.plan.robot.limits.room.holds(np.array(record.deviation)):

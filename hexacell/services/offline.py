@@ -10,6 +10,7 @@ from hexacell.campaign import decisions, feasibility
 from hexacell.campaign.feasibility import unreachable_share
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import pose_list_of
+from hexacell.campaign.time_model import lost_to_speed
 from hexacell.cell.loader import Cell
 from hexacell.errors import FileError, HexacellError, UsageError, joined
 from hexacell.identification.estimator import identify
@@ -55,6 +56,7 @@ class PlanTrial:
         target_mm: predicted error at which measuring ends, if the cell file states one.
         averaging: what means of more readings would gain if all noise differed from reading to reading.
         encoders_part_mm: what the encoders contribute to the first of these errors.
+        lost_to_speed: minutes that a calibration would take less at twice the speeds with gauges.
     """
 
     result: DryRunResult
@@ -62,6 +64,7 @@ class PlanTrial:
     target_mm: float | None
     averaging: tuple[AveragingForecast, ...] = ()
     encoders_part_mm: float | None = None
+    lost_to_speed: float = 0.0
 
 
 def fit_measurements(
@@ -151,6 +154,7 @@ def try_plan(cell: Cell) -> PlanTrial:
         cell.settings.identification.target_mm,
         noise_assessment.averaging_forecasts(plan, averaged),
         noise_assessment.encoders_part(plan, noise),
+        lost_to_speed=lost_to_speed(cell.settings),
     )
 
 

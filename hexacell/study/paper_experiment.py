@@ -24,8 +24,8 @@ from hexacell.identification.problem.problem import Problem
 from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot.model import Robot
+from hexacell.study.chosen_orientations import chosen_orientations
 from hexacell.study.data_sets import DataSet, unlimited_travel
-from hexacell.study.design_records import chosen_orientations
 from hexacell.study.paper_simulation import NOISE_MM, SEED, bundled_robot, median
 from hexacell.study.reference_solvers import gauss_newton
 from hexacell.study.tasks import Study

@@ -19,6 +19,9 @@ from hexacell.verdict.decision import Verdict
 TRYING_PLAN = "Trying the plan on simulated robots within the tolerances, some seconds ..."
 
 
+LEAST_LOST = 0.5
+"""Minutes that slow moves take which are worth telling."""
+
 SHOWN_BUDGETS = 4
 """For so many shorter durations it is told what they would give."""
 
@@ -109,6 +112,9 @@ def plan_trial_lines(trial: PlanTrial) -> Iterator[str]:
                 f"{shown(result.expanded_mm)}, with the systematic effects of [uncertainty]."
             )
         yield from _course_lines(result)
+        if trial.lost_to_speed >= LEAST_LOST:
+            saved = duration(trial.lost_to_speed)
+            yield f"Twice the speeds with gauges at the ball ([speed]) would take {saved} less."
         if result.verdicts is not None:
             yield from verdict_forecast_lines(result.verdicts, result.records)
         yield from averaging_lines(trial.averaging, trial.encoders_part_mm)

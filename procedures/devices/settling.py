@@ -99,11 +99,13 @@ async def settle(devices: Devices, timing: TimingSettings, clock: CellClock) -> 
     """
     window: deque[DeviceSnapshot] = deque()
     begun, looks = clock.now(), 0
+    # Readings come a little early or late: for that no further one is waited for.
+    least_s = timing.window_s - 0.5 * timing.interval_s
     while True:
         looks += 1
         look_s = clock.now()
         moving = await _look(devices, timing, clock, window)
-        is_full = len(window) >= timing.readings and window[-1].at_s - window[0].at_s >= timing.window_s
+        is_full = len(window) >= timing.readings and window[-1].at_s - window[0].at_s >= least_s
         if is_full and not moving:
             return Settled(tuple(window))
         # Counted too, because a slow device or a machine under load must not run out of time unread.

@@ -30,9 +30,7 @@ class HeldOutSteps:
 
     def next_step(self, state: RunState, phase: Phase) -> events.Step | None:
         """The next step of the first set that is not closed; None if all are."""
-        points = range(1, self.point_count + 1)
-        # Afterwards it begins where the gauges are.
-        for point in reversed(points) if phase is Phase.AFTER else points:
+        for point in range(1, self.point_count + 1):
             key = SetKey(phase=phase, point=point)
             if not state.set(key).closed and not self._is_left(state, key):
                 return events.Locate() if state.position_unknown else self._in_set(state, key)

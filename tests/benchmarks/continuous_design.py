@@ -22,6 +22,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import qmc
 
 from hexacell.design.candidates import ReachableTargets, reachable_targets, rows_apart
 from hexacell.design.predicted_records import GaugeZero, gauge_zero_at, position_derivatives
@@ -30,7 +31,6 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics import rotations
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.study.design_records import possible_targets
 
 SPREAD, CLIMBING, ADDED = 2048, 24, 12
 """Poses of a point that are looked at; those of them that are climbed; those that come in."""
@@ -306,3 +306,19 @@ def design_of(belief: RobotBelief, found: Identification) -> tuple[Design, list[
         domains.append(domain)
         points.append(PointDesign(records[:1], records[1:], np.ones(len(records) - 1)))
     return Design(tuple(points), problem.prior.precision), domains
+
+
+def possible_targets(belief: RobotBelief, zero: GaugeZero, count: int, seed: int) -> ReachableTargets:
+    """The poses, of ``count`` (a power of two) all over tilt and turn, that the estimated robot can take.
+
+    The ball is where the gauges were zeroed, and the robot on the assembly mode that it had there.
+    """
+    heading, tilted, turned = qmc.Sobol(3, seed=seed).random(count).T
+    limits, zeros = belief.limits, np.zeros(count)
+    angle, heading = limits.tilt * np.sqrt(tilted), 2.0 * np.pi * heading
+    directions = np.stack([np.cos(heading), np.sin(heading), zeros], axis=-1)
+    turn = limits.turn * (2.0 * turned - 1.0)
+    tilts = rotations.from_vector(angle[:, None] * directions)
+    turns = rotations.from_vector(np.stack([zeros, zeros, turn], axis=-1))
+    poses = PoseBatch.at(zero.reference, limits.orientations(tilts @ turns))
+    return reachable_targets(belief, poses, zero.mode(belief))

@@ -31,7 +31,6 @@ SAMPLES: dict[str, dict[str, tuple[int, int]]] = {
     "scatter": {"MACHINES": (4, 167)},
     "screen_speed": {"RUNS": (3, 5)},
     "statistics": {"PAIRED": (100, 100), "ROBOTS": (200, 1000), "SETS": (1000, 1000)},
-    "study_speed": {"ROBOTS": (24, 200)},
     "terms": {"MACHINES": (6, 100)},
     "tolerances": {"BUILT": (300, 1500)},
     "worlds": {"RUNS": (1, 34)},

@@ -39,7 +39,7 @@ CELLS = ("simulated-hexaglide", "gough-stewart", "linapod", "rotary-cranks")[
     : sample(__name__, "MECHANISMS")
 ]
 CLOCK_FACTOR = 1.0 if len(CELLS) > 1 else 4.0
-"""In real time the program's own time counts as it does in a real cell, and a run takes a quarter of an hour."""
+"""In real time the program counts as it does in a real cell; a run takes a quarter of an hour."""
 
 
 def minutes_and_u(number: int) -> tuple[float, float] | None:

@@ -58,8 +58,7 @@ def test_the_demo_passes_with_one_document_on_stdout_and_text_on_stderr(demo):
     sets = [line for line in words if " records, " in line and ", again" not in line]
     assert [line[:24].strip() for line in sets] == [
         *(f"point {number}" for number in range(1, 6)),
-        *(f"held-out point {number}, before" for number in (1, 2, 3)),
-        *(f"held-out point {number}, after" for number in (3, 2, 1)),
+        *(f"held-out point {number}, {when}" for when in ("before", "after") for number in (1, 2, 3)),
     ]
 
 

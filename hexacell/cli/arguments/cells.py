@@ -105,11 +105,6 @@ _EACH_CASE = "of orientations and noise, for each case"
 STUDIES = (
     ("paper", "figures 4 and 5 and table 2 of Abtahi et al. (2010)", _EACH_CASE),
     ("experiment", "its experiment, figures 8 and 9, by the robot's repeatability", _EACH_CASE),
-    (
-        "design",
-        "accuracy by records, choice of orientations, travel, tilt, noise and points",
-        "robots, each measured in every way",
-    ),
 )
 """Name, summary, and what is drawn; each is a row of ``hexacell.cli.commands.study``, slow to import."""
 

@@ -88,7 +88,7 @@ def test_a_study_needs_no_files_of_its_own(tmp_path, monkeypatch) -> None:
     found = api.study("experiment", draws=1)
     assert repr(found) == repr(api.study("experiment", draws=1, folder=tmp_path / "kept"))  # NaN is not NaN
     assert (tmp_path / "kept" / "experiment.jsonl").is_file()
-    with pytest.raises(UsageError, match=r"no study 'papers'. There are: paper, experiment, design"):
+    with pytest.raises(UsageError, match=r"no study 'papers'. There are: paper, experiment"):
         api.study("papers", draws=1)
 
 

@@ -2,16 +2,26 @@
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from hexacell.campaign.budget import MOST_SHARE, Budget, paid_sizes, shared_sizes
 from hexacell.campaign.decisions import CampaignState
-from hexacell.campaign.time_model import MOVE_OVERHEAD_S, TimeModel
+from hexacell.campaign.time_model import (
+    MOVE_OVERHEAD_S,
+    TimeKind,
+    TimeModel,
+    calibration_seconds,
+    lost_to_speed,
+    seconds_beside,
+)
+from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.motion.durations import SpeedLimits, line_duration
+from hexacell.robot.virtual_robot import VirtualRobot
 
 SLOW = SpeedLimits(joint=25.0, edge_mm_s=25.0)
 TIMES = TimeModel(
@@ -55,6 +65,28 @@ def test_durations_of_a_cell(make_plan):
         for speed in (10.0, 40.0)
     )
     assert slow.move_s - MOVE_OVERHEAD_S == pytest.approx(4.0 * (fast.move_s - MOVE_OVERHEAD_S))
+
+
+def test_a_calibration_takes_what_its_parts_take(make_plan):
+    settings = make_plan().settings
+    whole, beside = calibration_seconds(settings), seconds_beside(settings)
+    assert all(whole[kind] >= beside[kind] for kind in TimeKind)
+    times, plan = TimeModel.of(settings), settings.identification
+    records, points = len(plan.points) * plan.orientations, len(plan.points)
+    more = sum(whole.values()) - sum(beside.values())
+    assert more == pytest.approx(60.0 * times.minutes(records, points))
+    assert 0.3 < 60.0 * lost_to_speed(settings) / whole[TimeKind.MOVING] < 0.5, "but for overheads, half"
+
+
+@pytest.mark.parametrize("minutes", [7.5, 9.0])
+def test_a_budget_in_minutes_is_what_the_whole_run_takes(make_plan, paper, minutes):
+    plan = make_plan(identification__budget_minutes=minutes, identification__orientations=3)
+    campaign = VirtualCampaign(plan, VirtualRobot(plan.robot, paper.actual, np.random.default_rng(2)))
+    campaign.carry_out()
+    beside = sum(seconds_beside(plan.settings).values()) / 60.0
+    assert campaign.minutes + beside == pytest.approx(minutes, rel=0.07)
+    assert len(campaign.measurements) > 5 * 3
+    assert campaign.state.begun_points == 5
 
 
 def test_ways_between_records_say_how_long_the_next_ones_take(make_plan):

@@ -156,20 +156,6 @@ def test_the_plan_finishes_when_the_target_is_reached(carry_out, campaign):
     assert taken[-1].decision.reason.startswith("the predicted error at the task poses is ")
 
 
-def test_a_point_is_finished_when_no_record_gains_enough(carry_out, campaign):
-    gains = [forecast.now_mm - forecast.next_mm for forecast in forecasts_of(campaign)]
-    plan = at_two_points(identification__least_gain_mm=1.1 * min(gains[-4:]))
-    taken = carry_out(plan)
-    assert len(records_of(taken)) < 16
-    closed = [one.decision for one in taken if isinstance(one.decision, FinishPoint)]
-    assert any("would gain" in decision.reason for decision in closed)
-
-
-def test_a_point_without_enough_gain_is_not_begun(make_plan):
-    plan = make_plan(identification__least_gain_mm=1000.0)
-    assert plan.decide(CampaignState()) == Finished("no record would gain 1000 mm at the task poses")
-
-
 def test_points_are_chosen_by_their_gain_per_minute(make_plan, carry_out):
     """A point close to one measured already gains little, though it is next in the file."""
     plan = make_plan(

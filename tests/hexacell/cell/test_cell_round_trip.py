@@ -67,7 +67,7 @@ def test_dump_of_a_real_cell_needs_no_simulation(load_text, cell_text):
 def test_description_has_the_origin_of_every_value(load_text, cell_text, line_with):
     text = describe(load_text(cell_text))
     assert f"tilt_deg = 45.0  # line {line_with('tilt_deg')}\n" in text
-    assert "window_s = 0.6  # default\n" in text
+    assert "interval_s = 0.1  # default\n" in text
     assert "# port is not set\n" in text
     values = [line for line in text.splitlines() if "=" in line and not line.startswith("#")]
     assert all("  # " in line or line.endswith("[") for line in values)

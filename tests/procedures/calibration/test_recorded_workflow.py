@@ -128,8 +128,8 @@ def test_the_steps_of_a_whole_run_in_their_order(recording) -> None:
         "propose",
         "commit",
         "locate",
-        *of_set("after-V2", 2 * HELD_OUT - 1),
         *of_set("after-V1", 2 * HELD_OUT - 1),
+        *of_set("after-V2", 2 * HELD_OUT - 1),
         "judge",
     ]
 

@@ -41,7 +41,7 @@ async def test_every_station_is_tried_once(recording, replayed) -> None:
     ended = await rig.run()
     assert ended.exit_code == ExitCode.DONE
     tried = [str(event.at) for event in happened(rig, events.GaugesTried)]
-    assert tried == ["before-V1", "before-V2", "after-V2", "after-V1"]
+    assert tried == ["before-V1", "before-V2", "after-V1", "after-V2"]
     assert len(happened(rig, events.GaugesProbed)) == 3 * len(tried)
     first = happened(rig, events.GaugesTried)[0].at
     trial = [f"{first}/o01/sample", *[f"{first}/o00/move", f"{first}/probe"] * 3]

@@ -6,6 +6,7 @@ import pytest
 
 from hexacell.config.write_back import commit
 from hexacell.config.write_record import RECORDS
+from hexacell.runs.run_folder import find_run
 from tests.hexacell.services.proposed_runs import propose_run
 from tests.hexacell.services.recorded_nights import Nights
 from tests.hexacell.services.test_history import identified
@@ -63,6 +64,10 @@ def test_a_run_is_told_in_lines(cell, typed_here) -> None:
         document["seconds"]
     )
     events = document["events"]
+    recorded = find_run(cell, "a").cell_file
+    recorded.write_text(recorded.read_text().replace("[timing]", "[timing]\nof_an_older_program = 1"))
+    older = typed_here("history", cell.path, "--show", "a")
+    assert (older.code, "It took " in older.out) == (0, False)
     assert [events[0]["kind"], events[-1]["kind"]] == ["started", "ended"]
     assert events[-1]["text"] == "over"
     assert typed_here("history", cell.path, "--show", "never").code == 2

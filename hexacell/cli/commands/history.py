@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from typing import Any
 
@@ -9,7 +10,7 @@ from hexacell.cell.loader import Cell, load_cell
 from hexacell.cli.commands.cell import archive_url, cell_at
 from hexacell.cli.commands.status import fleet_history_text
 from hexacell.cli.console import Console
-from hexacell.errors import ExitCode, UsageError
+from hexacell.errors import ExitCode, HexacellError, UsageError
 from hexacell.results.run_comparison import ParameterTrend, RunComparison
 from hexacell.runs.run_folder import RunFolder, find_run
 from hexacell.services.history import past_runs
@@ -44,16 +45,20 @@ def main(options: argparse.Namespace, console: Console) -> ExitCode:
         entries = read_entries(run.journal)
         if not entries:
             raise UsageError("nothing happened in this run", subject=run.path, action="Name another")
-        settings = load_cell(run.cell_file).settings
-        spent = time_spent(entries, settings.timing)
         told = [
             {"line": entry.number, "at": entry.at, "kind": entry.event.kind, "text": text}
             for entry, text in run_story(entries)
         ]
-        begun = fold(entry.event for entry in entries).started
-        mode = "" if begun is None else begun.mode
-        text = f"{story_text(entries)}\n{wrapped(spent_sentence(spent, settings, mode))}"
-        console.show({"events": told, "seconds": spent}, text)
+        document: dict[str, Any] = {"events": told}
+        text = story_text(entries)
+        with suppress(
+            HexacellError
+        ):  # the cell file of an older program may have what this one does not know
+            settings = load_cell(run.cell_file).settings
+            spent, begun = time_spent(entries, settings.timing), fold(one.event for one in entries).started
+            document |= {"seconds": spent}
+            text += "\n" + wrapped(spent_sentence(spent, settings, begun.mode if begun else ""))
+        console.show(document, text)
     elif options.keep is not None:
         _keep(cell, options, console)
     elif options.changes:

@@ -11,10 +11,6 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.model import Robot
 
-COMPARED = 3
-"""Poses at each held-out point, its reference among them, that are measured before the write-back as well:
-so many show how wrong the robot was, and what the model is judged by comes from those afterwards."""
-
 SHARES = (0.0, 1.0 / 3.0, 2.0 / 3.0)
 """Shares of the way to the middle, by which a point is moved that the robot has too few poses at."""
 

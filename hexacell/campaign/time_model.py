@@ -11,7 +11,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from hexacell.campaign.held_out_sets import COMPARED
 from hexacell.cell.limits import SpeedSettings
 from hexacell.cell.model import CellSettings
 from hexacell.design.candidates import ReachableTargets
@@ -146,12 +145,23 @@ class TimeModel:
 def calibration_seconds(settings: CellSettings) -> Seconds:
     """What a calibration takes in all, as far as the cell file tells."""
     times, plan, total = TimeModel.of(settings), settings.identification, seconds_beside(settings)
-    points = len(plan.points)
-    records = points * plan.orientations
+    points, records = len(plan.points), planned_records(settings)
     total[TimeKind.MOVING] += records * times.move_s + points * times.station_s
     total[TimeKind.READING] += records * times.reading_s
     total[TimeKind.PLACING] += points * times.place_s
     return total
+
+
+def planned_records(settings: CellSettings) -> int:
+    """How many records the points get in all, as far as the cell file tells."""
+    times, plan = TimeModel.of(settings), settings.identification
+    points = len(plan.points)
+    if plan.budget_minutes is None:
+        return points * plan.orientations
+    left_s = 60.0 * (plan.budget_minutes - times.minutes(0, points)) - sum(
+        seconds_beside(settings).values()
+    )
+    return max(2 * points, int(left_s / times.record_s))
 
 
 def lost_to_speed(settings: CellSettings) -> float:
@@ -169,8 +179,8 @@ def lost_to_speed(settings: CellSettings) -> float:
 def seconds_beside(settings: CellSettings) -> Seconds:
     """What a calibration takes beside its identification: the noise, and the held-out points twice."""
     times, wanted, noise = TimeModel.of(settings), settings.verification, settings.noise
-    points, compared = len(wanted.points), min(COMPARED, wanted.orientations)
-    moves, stations = points * (2 * compared + wanted.orientations - 1), 2 * points
+    points = len(wanted.points)
+    moves, stations = points * (wanted.compared + wanted.afterwards), 2 * points
     standing_s = noise.standstill_readings * settings.timing.interval_s
     visits_s = noise.revisits * times.move_s  # mostly from poses near by
     return no_seconds() | {

@@ -19,6 +19,8 @@ from hexacell.cell.fields import (
 )
 
 MOST_POINTS, MOST_POSES, MOST_RECORDS = 100, 1000, 10_000
+MOST_COMPARED = 3
+"""So many held-out poses of a point show how wrong the robot was; the model is judged by later ones."""
 MOST_REVISITS = 100
 """More would take longer than any machine stays as it is."""
 
@@ -110,6 +112,16 @@ class VerificationSettings(Section):
     )
     orientations: int = key(6, "poses at each point, its reference included", ge=2, le=MOST_POSES)
     seed: Seed = key(2, "random seed of the held-out orientations")
+
+    @property
+    def compared(self) -> int:
+        """Poses at each point, its reference included, that are measured before the write-back as well."""
+        return min(MOST_COMPARED, self.orientations)
+
+    @property
+    def afterwards(self) -> int:
+        """Poses at each point after it: those, and others as wide as the limits."""
+        return self.compared + self.orientations - 1
 
 
 class ErrorLimits(Section):

@@ -16,6 +16,7 @@ import numpy as np
 from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import PoseList
+from hexacell.campaign.time_model import planned_records
 from hexacell.cell.model import CellSettings
 from hexacell.checks.check import Check, identified_before
 from hexacell.checks.quick_level import QuickLevel
@@ -324,14 +325,13 @@ def expected_records(
         return length
     plan, held_out = settings.identification, settings.verification
     points = len(held_out.points)
-    verification = points * (held_out.orientations + 1)
+    verification = points * (held_out.compared + 1 + held_out.afterwards + 1)
     if mode is Mode.CHECK:
         return settings.check.budget_records + len(plan.points)
-    records = len(plan.points) * plan.orientations if listed is None else len(listed)
+    records = planned_records(settings) if listed is None else len(listed)
     budget = settings.quick.budget_records if mode is Mode.QUICK else plan.budget_records
     identification = min(records, budget or records) + len(plan.points)
-    calibration = identification + 2 * verification + points * (held_out.orientations - 1)
-    return calibration + (length if length_check else 0)
+    return identification + verification + (length if length_check else 0)
 
 
 def campaign_state(state: RunState, key: SetKey | None) -> CampaignState:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell.campaign.held_out_sets import COMPARED, held_out_sets, held_out_turns
+from hexacell.campaign.held_out_sets import held_out_sets, held_out_turns
 from hexacell.cell.model import CellSettings
 from hexacell.design.validation_poses import select_validation_poses
 from hexacell.errors import LimitError
@@ -46,7 +46,7 @@ class HeldOutPoses:
 
         Raises ``LimitError`` if all points are.
         """
-        count = min(COMPARED, self.settings.verification.orientations)
+        count = self.settings.verification.compared
         sets = [*held_out_sets(self.robot, self.settings, identified, self._turns(), count)]
         failures = [one for one in sets if isinstance(one, LimitError)]
         if len(failures) == len(sets):

@@ -57,10 +57,11 @@ def progress(picture: RunPicture, settings: CellSettings | None) -> Progress:
     done, planned = readings(picture)
     if (at := picture.at) is None or settings is None:
         return Progress("", done, planned)
-    is_identifying = at.phase is Phase.IDENTIFY
-    plan = settings.identification if is_identifying else settings.verification
+    held_out = settings.verification
+    planned_at = {Phase.BEFORE: held_out.compared, Phase.AFTER: held_out.afterwards}
+    plan = settings.identification if at.phase is Phase.IDENTIFY else held_out
     taken = len(picture.state.set(at).samples)
-    points, records = len(plan.points), max(plan.orientations, taken)
+    points, records = len(plan.points), max(planned_at.get(at.phase, plan.orientations), taken)
     place = f"{PHASES[at.phase]}: point {at.point} of {points}, record {max(1, taken)} of about {records}"
     if at.phase is Phase.LENGTH:
         place = f"{PHASES[at.phase]}: mounting {at.point}"

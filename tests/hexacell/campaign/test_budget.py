@@ -15,6 +15,7 @@ from hexacell.campaign.time_model import (
     TimeModel,
     calibration_seconds,
     lost_to_speed,
+    planned_records,
     seconds_beside,
 )
 from hexacell.dry_run.campaign import VirtualCampaign
@@ -76,6 +77,14 @@ def test_a_calibration_takes_what_its_parts_take(make_plan):
     more = sum(whole.values()) - sum(beside.values())
     assert more == pytest.approx(60.0 * times.minutes(records, points))
     assert 0.3 < 60.0 * lost_to_speed(settings) / whole[TimeKind.MOVING] < 0.5, "but for overheads, half"
+
+
+@pytest.mark.parametrize("minutes", [7.0, 12.0])
+def test_a_budget_in_minutes_is_what_a_calibration_is_expected_to_take(make_plan, minutes):
+    settings = make_plan(identification__budget_minutes=minutes).settings
+    assert sum(calibration_seconds(settings).values()) == pytest.approx(60.0 * minutes, rel=0.01)
+    listed = make_plan().settings
+    assert planned_records(listed) == len(listed.identification.points) * listed.identification.orientations
 
 
 @pytest.mark.parametrize("minutes", [7.5, 9.0])

@@ -1,6 +1,7 @@
 """When a campaign ends, and when it leaves a point: budget, accuracy reached, another point worth more."""
 
 from dataclasses import dataclass
+from math import hypot
 from typing import Protocol
 
 from hexacell.campaign.decisions import CampaignState
@@ -10,6 +11,7 @@ from hexacell.campaign.pilots import are_counted
 from hexacell.cell.model import CellSettings
 from hexacell.lengths import shown
 from hexacell.measurements.records import MeasurementSet
+from hexacell.uncertainty.statement import COVERAGE_FACTOR
 
 REFUSALS = 3
 """Number of records of one point that may leave the travel before the point is given up."""
@@ -76,9 +78,11 @@ class StoppingRules:
         if found is None or not found.problem.subset(are_counted(found.problem)).is_determined:
             return None
         worst = self.forecaster.worst_error(state, estimate.belief)
-        if worst is None or worst > target:
+        if worst is None:
             return None
-        return f"the predicted error at the task poses is {shown(worst)}, within {target:g} mm"
+        expanded = COVERAGE_FACTOR * hypot(worst, self.forecaster.systematic_mm() or 0.0)
+        is_reached = expanded <= target
+        return f"U at the task poses is {shown(expanded)}, within {target:g} mm" if is_reached else None
 
     def _another_point(self, state: CampaignState, point: int) -> str | None:
         """Whether another point is worth more, if points are to be chosen, in words."""

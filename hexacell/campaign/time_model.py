@@ -17,17 +17,31 @@ from hexacell.design.candidates import ReachableTargets
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.commanded_motion import ActualPoses
 from hexacell.kinematics.parameters import JointUnit
+from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import Record
 from hexacell.motion.durations import SpeedLimits, approximate_durations, line_durations
 from hexacell.motion.trajectory import PIECES
 from hexacell.robot.model import Robot
 
-MOVE_OVERHEAD_S = 0.3
-"""Time of a move to speed up, to slow down, and to be acknowledged."""
 
-READING_OVERHEAD_S = 0.3
-"""Time of a reading beside its window: all devices are asked before, and answer at last."""
+@dataclass(frozen=True, slots=True)
+class Overheads:
+    """What the steps of a run take beside what the cell file tells.
+
+    Attributes:
+        move_s: of a move, to speed up, to slow down, and to be acknowledged.
+        reading_s: of a reading beside its window: all devices are asked before, and answer at last.
+        place_s: for a person to bring the gauges to a point; None: as the cell file states.
+    """
+
+    move_s: float = 0.3
+    reading_s: float = 0.35
+    place_s: float | None = None
+
+
+USUAL = Overheads()
+"""Means over the bundled cells, for a cell of which no run tells."""
 
 USUAL_TURN, OF_RECORDS = 0.31, 11
 """How far the platform turns for a record where a point has so many, rad, waypoints included: the mean in
@@ -76,11 +90,12 @@ class TimeModel:
 
     Attributes:
         place_s: for a person to bring the gauges to a point.
-        trial_s: to try them there.
+        trial_s: to try them there; 0 where they are fixed, which are tried once.
         station_s: for that, to go there, and to come back to its reference in the end.
         reading_s: to read a record, once the robot stands still.
         move_s: to go to its pose; ``wide_move_s`` from one held-out pose to the next.
         speeds: the largest speeds with gauges at the ball.
+        overheads: what they were computed with.
     """
 
     place_s: float
@@ -90,29 +105,31 @@ class TimeModel:
     move_s: float
     wide_move_s: float
     speeds: SpeedLimits
+    overheads: Overheads
 
     @classmethod
-    def of(cls, settings: CellSettings) -> "TimeModel":
+    def of(cls, settings: CellSettings, overheads: Overheads = USUAL) -> "TimeModel":
         """The durations before anything is measured."""
-        stations, reading_s = settings.stations, settings.timing.window_s + READING_OVERHEAD_S
-        is_by_hand = stations.placement == "by-hand"
+        reading_s = settings.timing.window_s + overheads.reading_s
+        is_by_hand = settings.stations.placement == "by-hand"
         speeds = speed_limits(settings.speed, at_gauges=True)
         between = speed_limits(settings.speed, at_gauges=not is_by_hand)
         radius = float(settings.mechanism.platform_radius(settings.drawing))
         usual = USUAL_TURN * (OF_RECORDS / settings.identification.orientations) ** 0.5
         wide = WIDE_SHARE * float(np.radians(settings.limits.tilt_deg))
         move_s, wide_move_s = (
-            MOVE_OVERHEAD_S + _seconds(settings, turn * radius, speeds) for turn in (usual, wide)
+            overheads.move_s + _seconds(settings, turn * radius, speeds) for turn in (usual, wide)
         )
         points = np.array(settings.identification.points)[:, :3]
         apart_mm = float(np.linalg.norm(np.diff(points, axis=0), axis=1).mean())
-        trial_s = TRIAL_MOVES * (MOVE_OVERHEAD_S + _seconds(settings, stations.trial_mm, speeds))
-        trial_s = trial_s + TRIAL_READINGS * reading_s if stations.trial_mm else 0.0
+        trial_s = _trial_seconds(settings, overheads) if is_by_hand else 0.0
         station_s = (
-            trial_s + MOVE_OVERHEAD_S + _seconds(settings, apart_mm, between) + wide_move_s + reading_s
+            trial_s + overheads.move_s + _seconds(settings, apart_mm, between) + wide_move_s + reading_s
         )
-        place_s = 60.0 * settings.identification.minutes_per_station if is_by_hand else 0.0
-        return cls(place_s, trial_s, station_s, reading_s, move_s, wide_move_s, speeds)
+        stated_s = 60.0 * settings.identification.minutes_per_station
+        place_s = stated_s if overheads.place_s is None else overheads.place_s
+        place_s = place_s if is_by_hand else 0.0
+        return cls(place_s, trial_s, station_s, reading_s, move_s, wide_move_s, speeds, overheads)
 
     def after(self, robot: Robot, records: Sequence[Record]) -> "TimeModel":
         """These durations, the next moves being as the ways between the records, if there are enough."""
@@ -124,7 +141,17 @@ class TimeModel:
         )
         of_robot = robot.mechanism, robot.controller, robot.branch
         ways = line_durations(*of_robot, starts, ends, self.speeds, PIECES)
-        return replace(self, move_s=MOVE_OVERHEAD_S + float(ways.mean()))
+        return replace(self, move_s=self.overheads.move_s + float(ways.mean()))
+
+    def between_held_out(self, robot: Robot, sets: Sequence[PoseBatch]) -> "TimeModel":
+        """These durations, held-out poses being the sets, each in its order, its reference first."""
+        pairs = [(one[:-1], one[1:]) for one in sets]
+        starts, ends = (PoseBatch.joined([pair[side] for pair in pairs]) for side in (0, 1))
+        robot_of = robot.mechanism, robot.commanding, robot.branch
+        ways = line_durations(*robot_of, starts, ends, self.speeds, PIECES)
+        wide_move_s = self.overheads.move_s + float(np.nanmean(ways))
+        station_s = self.station_s + wide_move_s - self.wide_move_s  # the way back is as wide
+        return replace(self, wide_move_s=wide_move_s, station_s=station_s)
 
     @property
     def record_s(self) -> float:
@@ -139,7 +166,7 @@ class TimeModel:
         """To go from a pose (1) straight to others and to read there (n,)."""
         ends = (start.poses, start.joints), (targets.poses, targets.joints)
         ways = approximate_durations(belief.mechanism, belief.estimate, *ends, self.speeds)
-        return np.asarray(ways + MOVE_OVERHEAD_S + self.reading_s)
+        return np.asarray(ways + self.overheads.move_s + self.reading_s)
 
 
 def calibration_seconds(settings: CellSettings) -> Seconds:
@@ -176,18 +203,29 @@ def lost_to_speed(settings: CellSettings) -> float:
     return (now - then) / 60.0
 
 
-def seconds_beside(settings: CellSettings) -> Seconds:
-    """What a calibration takes beside its identification: the noise, and the held-out points twice."""
-    times, wanted, noise = TimeModel.of(settings), settings.verification, settings.noise
+def seconds_beside(settings: CellSettings, known: TimeModel | None = None) -> Seconds:
+    """What a calibration takes beside its identification: the noise, and the held-out points twice.
+
+    ``known``: by these durations, not by those that the cell file tells.
+    """
+    times, wanted, noise = known or TimeModel.of(settings), settings.verification, settings.noise
     points = len(wanted.points)
     moves, stations = points * (wanted.compared + wanted.afterwards), 2 * points
     standing_s = noise.standstill_readings * settings.timing.interval_s
     visits_s = noise.revisits * times.move_s  # mostly from poses near by
+    trial_s = 0.0 if times.trial_s else _trial_seconds(settings, times.overheads)
     return no_seconds() | {
         TimeKind.READING: standing_s + (noise.revisits + moves) * times.reading_s,
-        TimeKind.MOVING: visits_s + moves * times.wide_move_s + stations * times.station_s,
+        TimeKind.MOVING: trial_s + visits_s + moves * times.wide_move_s + stations * times.station_s,
         TimeKind.PLACING: stations * times.place_s,
     }
+
+
+def _trial_seconds(settings: CellSettings, overheads: Overheads) -> float:
+    """To try the gauges; 0 where they are not."""
+    trial_mm, reading_s = settings.stations.trial_mm, settings.timing.window_s + overheads.reading_s
+    move_s = overheads.move_s + _seconds(settings, trial_mm, speed_limits(settings.speed, at_gauges=True))
+    return TRIAL_MOVES * move_s + TRIAL_READINGS * reading_s if trial_mm else 0.0
 
 
 def _seconds(settings: CellSettings, way_mm: float, speeds: SpeedLimits) -> float:

@@ -33,8 +33,7 @@ class StationSettings(Section):
         "by-hand", "how the gauges come to a point: by-hand, or fixed where they need no placing"
     )
     trial_mm: NotNegative = key(
-        1.0,
-        "size of the small moves by which gauges are tried once they were placed or connected, mm; 0: none",
+        1.0, "length of the small moves by which gauges are tried once placed or connected, mm; 0: none"
     )
     mounting_mm: NotNegative = key(
         1.0, "how far from the middle of its travel a plunger may stand when it is zeroed, mm"
@@ -60,7 +59,7 @@ class IdentificationSettings(Section):
         "what a pose reduces: the error at the task poses or of all parameters; or bits gained",
     )
     target_mm: Positive | None = key(
-        None, "predicted error at every task pose, mm, 1 sigma, below which measuring is done"
+        None, "U of the largest error at the task poses, mm, from which on measuring is done"
     )
     budget_records: int | None = key(None, "most records, references included", ge=2, le=MOST_RECORDS)
     budget_minutes: Positive | None = key(

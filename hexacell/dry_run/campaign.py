@@ -11,7 +11,8 @@ import numpy as np
 from hexacell.campaign import decisions
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.time_model import (
-    MOVE_OVERHEAD_S,
+    USUAL,
+    Overheads,
     Seconds,
     TimeKind,
     TimeModel,
@@ -20,7 +21,7 @@ from hexacell.campaign.time_model import (
     speed_limits,
 )
 from hexacell.checks.quick_level import QuickAccuracy, QuickLevel
-from hexacell.dry_run.verdict_forecast import VerdictForecast, predicted_verdicts
+from hexacell.dry_run.verdict_forecast import VerdictForecast, predicted_held_out_sets, predicted_verdicts
 from hexacell.errors import HexacellError, ReachError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
@@ -54,11 +55,16 @@ class VirtualCampaign:
     reason: str = ""
     seconds: Seconds = field(default_factory=no_seconds)
     course: list[tuple[float, float]] = field(default_factory=list)
+    overheads: Overheads = USUAL
 
     @property
     def minutes(self) -> float:
         """How long it took so far."""
         return sum(self.seconds.values()) / 60.0
+
+    @property
+    def _times(self) -> TimeModel:
+        return TimeModel.of(self.plan.settings, self.overheads)
 
     @property
     def measurements(self) -> MeasurementSet:
@@ -89,7 +95,7 @@ class VirtualCampaign:
                 self._go_to_point(decision)
                 self.virtual_robot.zero_gauges()
                 self._measure(decision)
-                times = TimeModel.of(self.plan.settings)
+                times = self._times
                 self.seconds[TimeKind.PLACING] += times.place_s
                 self.seconds[TimeKind.MOVING] += times.trial_s
                 # As to measure the noise, it leaves the first reference for pilot poses and comes back.
@@ -127,7 +133,7 @@ class VirtualCampaign:
         robot, speeds = self.plan.robot, speed_limits(self.plan.settings.speed, at_gauges=True)
         for start, end in pairwise([one for one in (self.state.present, *way) if one is not None]):
             line = line_duration(robot.mechanism, robot.controller, robot.branch, start, end, speeds)
-            self.seconds[TimeKind.MOVING] += line + MOVE_OVERHEAD_S
+            self.seconds[TimeKind.MOVING] += line + self.overheads.move_s
 
     def _go_to_point(self, start: decisions.StartPoint) -> None:
         self.virtual_robot.place(start.pose)
@@ -150,7 +156,7 @@ class VirtualCampaign:
 
     def _take(self, decision: decisions.StartPoint | decisions.MeasurePose) -> Record | None:
         """The record at the pose of a decision; None where the ball left the gauges' travel."""
-        self.seconds[TimeKind.READING] += TimeModel.of(self.plan.settings).reading_s
+        self.seconds[TimeKind.READING] += self._times.reading_s
         record = self.virtual_robot.measure(decision.point, decision.orientation)
         self.state = replace(self.state, present=decision.pose)
         if self.plan.robot.limits.room.holds(np.array(record.deviation)):
@@ -216,33 +222,34 @@ class DryRunResult:
         return sum(self.seconds.values()) / 60.0
 
 
-def dry_run(plan: Plan) -> DryRunResult:
-    """Carry the plan out on a few robots. Takes a second or two for each."""
+def dry_run(plan: Plan, overheads: Overheads = USUAL) -> DryRunResult:
+    """Carry the plan out on a few robots, in a cell of these overheads; a second or two for each."""
     identified: list[_Outcome] = []
     tried = 0
     for truth in robots_within_tolerances(plan.robot, MOST_TRIED, plan.settings.identification.seed):
         if len(identified) == plan.effort.dry_run_robots:
             break
-        outcome = _carry_out(plan, truth, tried)
+        outcome = _carry_out(plan, truth, tried, overheads)
         identified += [] if outcome is None else [outcome]
         tried += 1
-    return _summary(plan, tried, identified)
+    return _summary(tried, identified)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Outcome:
-    """The campaign on one robot, and the error that remains."""
+    """The campaign on one robot, the error that remains, and what the run takes ``beside`` it."""
 
     campaign: VirtualCampaign
     forecast: decisions.Forecast | None
     budget: UncertaintyBudget | None
     verdicts: VerdictForecast | None
+    beside: Seconds
 
 
-def _carry_out(plan: Plan, truth: Geometry, number: int) -> _Outcome | None:
+def _carry_out(plan: Plan, truth: Geometry, number: int, overheads: Overheads) -> _Outcome | None:
     """The outcome for one robot; None if it is not identified, or a gate of a run would refuse it."""
     random = np.random.default_rng([plan.settings.identification.seed, number])
-    campaign = VirtualCampaign(plan, VirtualRobot(plan.robot, truth, random))
+    campaign = VirtualCampaign(plan, VirtualRobot(plan.robot, truth, random), overheads=overheads)
     try:
         campaign.carry_out()
         plan = campaign.plan
@@ -258,10 +265,13 @@ def _carry_out(plan: Plan, truth: Geometry, number: int) -> _Outcome | None:
     zeros, belief = plan.robot.identified_zeros(found), plan.robot.belief(found)
     belief = belief if zeros is None else replace(belief, covariance=zeros.free_covariance)
     budget = plan.task.budget(found, belief, plan.robot.effects, zeros=zeros)
-    return _Outcome(campaign, forecast, budget, predicted_verdicts(plan, found, budget))
+    sets, times = predicted_held_out_sets(plan, found), TimeModel.of(plan.settings, overheads)
+    verdicts = predicted_verdicts(plan, found, budget, sets)
+    times = times.between_held_out(plan.robot, sets) if sets else times
+    return _Outcome(campaign, forecast, budget, verdicts, seconds_beside(plan.settings, times))
 
 
-def _summary(plan: Plan, tried: int, identified: list[_Outcome]) -> DryRunResult:
+def _summary(tried: int, identified: list[_Outcome]) -> DryRunResult:
     if not identified:
         return DryRunResult(tried, 0, 0, 0, 0, None)
     points = round(median(outcome.campaign.state.begun_points for outcome in identified))
@@ -269,9 +279,11 @@ def _summary(plan: Plan, tried: int, identified: list[_Outcome]) -> DryRunResult
     errors = [outcome.forecast.now_mm for outcome in identified if outcome.forecast is not None]
     verdicts = [outcome.verdicts for outcome in identified if outcome.verdicts is not None]
     expanded = [outcome.budget.expanded_mm for outcome in identified if outcome.budget is not None]
-    first, beside = identified[0].campaign, seconds_beside(plan.settings)
-    rest = sum(beside.values()) / 60.0
-    taken = {kind: median(outcome.campaign.seconds[kind] for outcome in identified) for kind in TimeKind}
+    first, rest = identified[0].campaign, sum(identified[0].beside.values()) / 60.0
+    taken = {
+        kind: median(outcome.campaign.seconds[kind] + outcome.beside[kind] for outcome in identified)
+        for kind in TimeKind
+    }
     return DryRunResult(
         drawn=tried,
         robots=len(identified),
@@ -279,7 +291,7 @@ def _summary(plan: Plan, tried: int, identified: list[_Outcome]) -> DryRunResult
         records=records,
         outside=sum(outcome.campaign.outside for outcome in identified),
         worst_sigma_mm=median(errors) if errors else None,
-        seconds={kind: taken[kind] + beside[kind] for kind in TimeKind},
+        seconds=taken,
         expanded_mm=median(expanded) if expanded else None,
         verdicts=VerdictForecast.mean(verdicts) if verdicts else None,
         visited=tuple((one.point, one.orientation, one.pose) for one in first.measurements.records),

@@ -27,6 +27,7 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.robot.model import Robot
 from hexacell.robot.virtual_robot import exact_records
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.effects import Occurrence
@@ -162,15 +163,15 @@ def _passing(statements: Sequence[LargestError], guard_band_factor: float) -> fl
 
 
 def predicted_verdicts(
-    plan: Plan, found: Identification, budget: UncertaintyBudget | None
+    plan: Plan, found: Identification, budget: UncertaintyBudget | None, sets: Sequence[PoseBatch]
 ) -> VerdictForecast | None:
     """The verdicts of a run on healthy machines with this geometry; None where none can be predicted.
 
-    ``budget`` is that of the identification. With zeros alone what is held is as wrong as its tolerances
-    allow.
+    ``budget`` is that of the identification, ``sets`` are the held-out poses afterwards. With zeros alone
+    what is held is as wrong as its tolerances allow.
     """
     try:
-        updated = with_held_out_records(plan, found)
+        updated = with_held_out_records(plan, found, sets)
     except HexacellError:
         return None
     after = plan.task.budget(updated, plan.robot.belief(updated), plan.robot.effects)
@@ -180,23 +181,38 @@ def predicted_verdicts(
     return forecast_verdicts(stated, after, plan.settings.acceptance.of_errors)
 
 
-def with_held_out_records(plan: Plan, found: Identification) -> Identification:
-    """The identification updated by the records that the held-out points will give if it is right.
+def predicted_held_out_sets(plan: Plan, found: Identification) -> list[PoseBatch]:
+    """The wide poses at the held-out points after the write-back, if the identification is right.
 
-    They are those of the wide poses after the write-back. The small tilts that are measured before as well
-    add little. A point at which the robot takes too few poses adds nothing.
+    Points at which the robot takes too few are left out; all, if it can be given no such geometry.
+    """
+    try:
+        robot = _with_written(plan, found)
+    except HexacellError:
+        return []
+    turns = held_out_turns(robot, plan.settings, plan.effort.forecast_held_out_candidates)
+    sets = held_out_sets(robot, plan.settings, found, turns, plan.settings.verification.orientations)
+    return [poses for poses in sets if isinstance(poses, PoseBatch)]
+
+
+def with_held_out_records(plan: Plan, found: Identification, sets: Sequence[PoseBatch]) -> Identification:
+    """The identification updated by the records that the held-out ``sets`` will give if it is right.
+
+    The small tilts that are measured before as well add little.
 
     Raises:
-        LimitError: no point has enough of them.
+        LimitError: there are none.
     """
-    written = (plan.robot.identified_zeros(found) or found).geometry
-    robot = plan.robot.with_controller(plan.robot.for_controller(written))
-    turns = held_out_turns(robot, plan.settings, plan.effort.forecast_held_out_candidates)
+    robot = _with_written(plan, found)
     records: list[Record] = []
-    sets = held_out_sets(robot, plan.settings, found, turns, plan.settings.verification.orientations)
     for point, poses in enumerate(sets, 1 + max(plan.points)):
-        if isinstance(poses, PoseBatch):
-            records += exact_records(robot, point, poses)
+        records += exact_records(robot, point, poses)
     if not records:
         raise LimitError("the robot takes too few poses at each of the held-out points")
     return update(found, robot.problem(MeasurementSet(tuple(records))))
+
+
+def _with_written(plan: Plan, found: Identification) -> Robot:
+    """The robot whose controller has what will be written of an identification."""
+    written = (plan.robot.identified_zeros(found) or found).geometry
+    return plan.robot.with_controller(plan.robot.for_controller(written))

@@ -259,5 +259,5 @@ def _windows_taken(plan: Plan, forecasts: tuple[measured_noise.AveragingForecast
         return worthwhile_windows(forecasts, stated or 1)
     enough_mm = plan.settings.identification.target_mm
     if enough_mm is None:
-        enough_mm = NEAR_LIMIT * limits.position_mm / (limits.guard_band_factor * COVERAGE_FACTOR)
-    return worthwhile_windows(forecasts, MOST_UNASKED, enough_mm)
+        enough_mm = NEAR_LIMIT * limits.position_mm / limits.guard_band_factor
+    return worthwhile_windows(forecasts, MOST_UNASKED, enough_mm / COVERAGE_FACTOR)

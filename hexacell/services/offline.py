@@ -53,10 +53,11 @@ class PlanTrial:
 
     Attributes:
         unreachable: share of the robots within the tolerances that cannot reach a point, by point.
-        target_mm: predicted error at which measuring ends, if the cell file states one.
+        target_mm: U at which measuring ends, if the cell file states one.
         averaging: what means of more readings would gain if all noise differed from reading to reading.
         encoders_part_mm: what the encoders contribute to the first of these errors.
         lost_to_speed: minutes that a calibration would take less at twice the speeds with gauges.
+        like: the run whose moves and readings it is expected to be as slow as; empty: the usual ones.
     """
 
     result: DryRunResult
@@ -65,6 +66,7 @@ class PlanTrial:
     averaging: tuple[AveragingForecast, ...] = ()
     encoders_part_mm: float | None = None
     lost_to_speed: float = 0.0
+    like: str = ""
 
 
 def fit_measurements(
@@ -144,17 +146,19 @@ def try_plan(cell: Cell) -> PlanTrial:
     """Carry out a cell's plan on robots drawn within its tolerances; raises as :func:`plan_of`."""
     from hexacell.dry_run.campaign import dry_run  # noqa: PLC0415 - takes seconds anyway
     from hexacell.noise import noise_assessment  # noqa: PLC0415 - likewise
+    from hexacell.services.history.recorded_cell import last_overheads  # noqa: PLC0415 - likewise
 
-    plan = plan_of(cell)
+    plan, (overheads, like) = plan_of(cell), last_overheads(cell)
     windows, noise = noise_assessment.WINDOWS, plan.robot.noise
     averaged = {number: noise_assessment.mean_of_independent(noise, number) for number in windows}
     return PlanTrial(
-        dry_run(plan),
+        dry_run(plan, overheads),
         unreachable_share(plan),
         cell.settings.identification.target_mm,
         noise_assessment.averaging_forecasts(plan, averaged),
         noise_assessment.encoders_part(plan, noise),
         lost_to_speed=lost_to_speed(cell.settings),
+        like=like,
     )
 
 

@@ -14,6 +14,7 @@ from hexacell.services.offline import PlanTrial
 from hexacell.text.layout import duration
 from hexacell.text.measured_noise import averaging_lines
 from hexacell.text.time_spent import spent_text
+from hexacell.uncertainty.statement import COVERAGE_FACTOR
 from hexacell.verdict.decision import Verdict
 
 TRYING_PLAN = "Trying the plan on simulated robots within the tolerances, some seconds ..."
@@ -93,6 +94,7 @@ def run_forecast_line(forecast: Forecast) -> str:
 def plan_trial_lines(trial: PlanTrial) -> Iterator[str]:
     """The outcome expected of a plan, and for which robots it fails."""
     result, target_mm = trial.result, trial.target_mm
+    like = f" (moves and readings as in the run {trial.like})" if trial.like else ""
     if not result.robots:
         yield (
             f"None of {result.drawn} robots drawn within the tolerances could be calibrated with this "
@@ -104,7 +106,7 @@ def plan_trial_lines(trial: PlanTrial) -> Iterator[str]:
         yield (
             f"{result.records} records at {result.points} points will give about "
             f"{shown(result.worst_sigma_mm)} at the worst of your task poses (one sigma), in about "
-            f"{spent_text(result.seconds)}."
+            f"{spent_text(result.seconds)}{like}."
         )
         if result.expanded_mm is not None:
             yield (
@@ -118,7 +120,8 @@ def plan_trial_lines(trial: PlanTrial) -> Iterator[str]:
         if result.verdicts is not None:
             yield from verdict_forecast_lines(result.verdicts, result.records)
         yield from averaging_lines(trial.averaging, trial.encoders_part_mm)
-        if target_mm is not None and result.worst_sigma_mm > target_mm:
+        expanded_mm = result.expanded_mm or COVERAGE_FACTOR * result.worst_sigma_mm
+        if target_mm is not None and expanded_mm > target_mm:
             yield f"That is not the target of {target_mm:g} mm: allow more records, points or tilt."
     if 0 < result.robots < result.drawn:
         failed = result.drawn - result.robots

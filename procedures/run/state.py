@@ -42,6 +42,7 @@ class RunState:
         path_from_reference: orientations and poses by which it came from the reference it was at last;
             0 where nothing is measured.
         position_unknown: the controller must be asked for the pose before the robot moves.
+        gauges_tried: they passed a trial, and nobody can have changed them since.
         excluded: poses that the controller refused, in the order of the refusals.
         off_plate: commands on the way to which the ball left its plates, with those near them.
         failures: how many, by kind and place, since the run was begun or resumed.
@@ -64,6 +65,7 @@ class RunState:
     path_from_reference: tuple[tuple[int, SixNumbers], ...] = ()
     position_unknown: bool = False
     invalidated: int = 0
+    gauges_tried: bool = False
     noise: events.NoiseMeasured | None = None
     identified: events.Identified | None = None
     proposed: events.Proposed | None = None
@@ -103,7 +105,8 @@ class RunState:
 
     def unverified(self, but: SetKey | None = None) -> RunState:
         """The state in which the gauges of all open sets but one may have been moved or switched off."""
-        return replace(self, sets={k: v if k == but else v.unverified() for k, v in self.sets.items()})
+        sets = {k: v if k == but else v.unverified() for k, v in self.sets.items()}
+        return replace(self, sets=sets, gauges_tried=self.gauges_tried and but is not None)
 
     @property
     def is_unverified(self) -> bool:

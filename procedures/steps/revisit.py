@@ -44,7 +44,8 @@ class SetInvalidated(EventOfSet):
         takes_all = self.at.phase is Phase.LENGTH and bool(state.set(self.at).samples)
         lost = {key for key in state.sets if key == self.at or (takes_all and key.phase is Phase.LENGTH)}
         kept = {key: value for key, value in state.sets.items() if key not in lost}
-        return replace(state, sets=kept, at_pose=None, invalidated=state.invalidated + 1)
+        invalidated = state.invalidated + 1
+        return replace(state, sets=kept, at_pose=None, invalidated=invalidated, gauges_tried=False)
 
     def text(self, state: RunState) -> str:
         return f"{self.at.name} is measured again: {self.reason}"

@@ -1,6 +1,7 @@
 """Try: back at a set's reference it is judged whether each gauge followed the ball."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -59,8 +60,9 @@ class GaugesTried(EventOfSet):
     response: tuple[ThreeNumbers, ThreeNumbers, ThreeNumbers]
 
     def applied_to(self, state: RunState) -> RunState:
-        """The set's gauges need no other trial until they are unwatched."""
-        return state.with_changed_set(self.at, tried=True, has_left=False)
+        """The gauges need no other trial until they are unwatched or placed by a person."""
+        tried = replace(state, gauges_tried=True)
+        return tried.with_changed_set(self.at, tried=True, has_left=False)
 
 
 class Try(StepOfSet):

@@ -78,7 +78,7 @@ class Measuring:
 
     def __init__(self, plan: Plan, allowances: Allowances) -> None:
         settings = plan.settings
-        sets = SetSteps(plan.robot, settings.stations.trial_mm, allowances)
+        sets = SetSteps(plan.robot, settings, allowances)
         self.points = IdentificationSteps(plan, sets, NoiseSteps(plan, sets))
         self.held_out = HeldOutSteps(len(settings.verification.points), sets)
         least = least_way(settings.mechanism.words.joint_unit, allowances.stops)

@@ -1,10 +1,11 @@
 """The steps within a set of poses and the moves between them: along checked straight lines, or none.
 
-The gauges of a set are tried whenever they were placed or connected again. From the recorded reference the
-ball is moved a millimetre along each axis of the base, and the gauges are read. Back at the reference it is
-judged whether each of them follows the ball on its axis, with its sign and scale
-(:mod:`hexacell.noise.gauge_trial`). Where they seem not to, the moves are repeated, twice as far each time
-as long as the gauges' travel allows. Only then is anything else measured.
+The gauges are tried whenever they were placed or connected again: at each set where a person places them,
+otherwise at the first one. From the recorded reference the ball is moved a millimetre along each axis of
+the base, and the gauges are read. Back at the reference it is judged whether each of them follows the ball
+on its axis, with its sign and scale (:mod:`hexacell.noise.gauge_trial`). Where they seem not to, the moves
+are repeated, twice as far each time as long as the gauges' travel allows. Only then is anything else
+measured.
 """
 
 from contextlib import suppress
@@ -16,6 +17,7 @@ import numpy as np
 
 from hexacell.campaign.decisions import MeasurePose
 from hexacell.campaign.pilots import pilot_number, with_pilots
+from hexacell.cell.model import CellSettings
 from hexacell.design.predicted_records import GaugeZero
 from hexacell.errors import HexacellError, LimitError
 from hexacell.identification.belief import RobotBelief
@@ -32,7 +34,7 @@ from procedures.run.state import RunState
 from procedures.steps.close import CloseSet
 from procedures.steps.events import Step
 from procedures.steps.move import Expectation, Move
-from procedures.steps.place import Place
+from procedures.steps.place import Place, are_fixed
 from procedures.steps.probe import Probe
 from procedures.steps.revisit import Revisit
 from procedures.steps.sample import Sample
@@ -60,13 +62,17 @@ class NoSafePath(LimitError):
 class SetSteps:
     """Decides on the steps of the sets of one robot, and plans its moves.
 
-    ``trial_mm`` is the length of a move by which the gauges are tried, 0 for no trial. A set's ``ball``
-    (3,), mm, is where the ball was when its gauges were zeroed; None where that is not known.
+    A set's ``ball`` (3,), mm, is where the ball was when its gauges were zeroed; None where unknown.
     """
 
     robot: Robot
-    trial_mm: float
+    settings: CellSettings
     allowances: Allowances
+
+    @property
+    def trial_mm(self) -> float:
+        """The length of a move by which the gauges are tried, 0 for no trial."""
+        return self.settings.stations.trial_mm
 
     def due_first(self, state: RunState, key: SetKey, ball: Array | None) -> Step | None:
         """What an open set needs before anything else is measured; None if it needs nothing.
@@ -206,7 +212,8 @@ class SetSteps:
     def _trial(self, state: RunState, key: SetKey, ball: Array | None) -> Step | None:
         """The next step of a trial; None if none is due."""
         measured = state.set(key)
-        if not self.trial_mm or measured.tried or not measured.samples:
+        is_passed = measured.tried or (state.gauges_tried and are_fixed(self.settings, key))
+        if not self.trial_mm or is_passed or not measured.samples:
             return None
         rounds, axis = divmod(len(measured.probes), AXES)
         is_last = rounds >= len(self._distances)  # there is no larger move

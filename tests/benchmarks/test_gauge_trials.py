@@ -28,6 +28,7 @@ def rigs(folder: Path, seed: int) -> Iterator[Any]:
     """Runs of drawn robots, with gauges and encoders as noisy as the bundled cell states."""
     noise: dict[str, Any] = {f"simulation__{one}": 0.01 for one in ("gauges__noise_mm", "encoders__noise")}
     noise |= {"noise__gauge_mm": 0.01, "noise__encoder": 0.01, "stations__trial_mm": 1.0}
+    noise |= {"stations__placement": "by-hand"}
     first = new_rig(folder)
     for number, geometry in enumerate(drawn_robots(first.cell.settings, seed)):
         place = folder / str(number)

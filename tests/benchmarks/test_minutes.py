@@ -11,7 +11,7 @@ import pytest
 
 from hexacell.campaign.forecast import PlannedInformation
 from hexacell.campaign.planner import Plan
-from hexacell.campaign.time_model import MOVE_OVERHEAD_S, TimeModel, seconds_beside
+from hexacell.campaign.time_model import TimeModel, seconds_beside
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.design.candidates import orientations
 from hexacell.design.criteria import add_information
@@ -94,7 +94,7 @@ def in_time(belief: RobotBelief, ball: Array, turns: Array, most_s: float, times
         few = left[:4]
         ways = line_durations(*robot, every[[taken[-1]] * len(few)], every[few], times.speeds, 8)
         best = int(np.nanargmin(ways))
-        spent += float(ways[best]) + MOVE_OVERHEAD_S + times.reading_s
+        spent += float(ways[best]) + times.overheads.move_s + times.reading_s
         if spent > most_s:
             break
         taken.append(few[best])

@@ -1,4 +1,4 @@
-"""The cell of a recorded run: its robot when the run began, its noise, its devices beside the current ones.
+"""The cell of a recorded run: its robot when it began, its noise, its devices beside those now, its times.
 
 A device that is not what it was when the cell was last run was exchanged, set anew, or plugged elsewhere.
 That may be on purpose, and a new run takes them as they are. But a preset, a reversed direction or an
@@ -10,7 +10,8 @@ from contextlib import suppress
 from dataclasses import replace
 
 from drivers.interfaces import DeviceIdentity
-from hexacell.cell.loader import Cell, checked_cell
+from hexacell.campaign.time_model import USUAL, Overheads
+from hexacell.cell.loader import Cell, checked_cell, load_cell
 from hexacell.cell.model import CellSettings
 from hexacell.config.interface import ControllerGeometry
 from hexacell.errors import HexacellError
@@ -21,11 +22,15 @@ from hexacell.robot.model import Robot, make_robot
 from hexacell.runs.run_folder import RunFolder, run_folders
 from hexacell.services.history.journal_soundness import read_sound
 from procedures.journal.journal import LONGEST_LINE, decode
+from procedures.journal.time_spent import overheads_of
 from procedures.run.state import RunState
 from procedures.steps.events import RunStarted
 
 OF_NO_RESULT = {"name", "report", "archive", "notifications", "opcua", "screen", "unattended"}
 """Parts of a cell file on which no result depends, as none does on comments and order: all others count."""
+
+LOOKED_AT = 5
+"""So many runs are read for one that tells what moves take."""
 
 
 def has_same_cell(started: RunStarted, cell: Cell) -> bool:
@@ -106,3 +111,16 @@ def _last(cell: Cell) -> tuple[str, dict[str, DeviceIdentity]]:
             if entry is not None and isinstance(entry.event, RunStarted) and entry.event.devices:
                 return run.name, {one.name: one for one in entry.event.devices}
     return "", {}
+
+
+def last_overheads(cell: Cell) -> tuple[Overheads, str]:
+    """What moves and readings took in the last run that tells it, and its name; what is usual, and ""."""
+    for folder in run_folders(cell)[: -LOOKED_AT - 1 : -1]:
+        with suppress(OSError, HexacellError):
+            settings = load_cell(folder.cell_file).settings
+            entries, state = read_sound(folder, settings)
+            if state.started is not None:
+                robot = started_robot(settings, state.started)
+                if (found := overheads_of(entries, settings, robot)) is not None:
+                    return found, folder.name
+    return USUAL, ""

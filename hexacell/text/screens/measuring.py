@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from statistics import median
 
+from hexacell.campaign.decisions import Forecast
 from hexacell.campaign.time_model import TimeModel
 from hexacell.cell.model import CellSettings
 from hexacell.lengths import from_to
@@ -14,6 +15,7 @@ from hexacell.text.layout import duration
 from hexacell.text.screens.questions import RECOVERIES
 from hexacell.text.screens.run_picture import RunPicture, Setback
 from hexacell.text.screens.views import FaultView, PlotView, Row, Series, Urgency
+from hexacell.uncertainty.statement import COVERAGE_FACTOR
 from procedures.calibration.calibration import Mode
 from procedures.run.keys import Phase, SetKey
 from procedures.steps import events
@@ -152,18 +154,25 @@ def off_of(
     return off, abs(off) / sigma if sigma else 0.0
 
 
+def _now_and_end(forecast: Forecast) -> tuple[float, float]:
+    """U now and at the end, mm; by the records alone where the systematic effects are not known."""
+    now, end = (
+        forecast.expanded_mm(one) or COVERAGE_FACTOR * one for one in (forecast.now_mm, forecast.end_mm)
+    )
+    return now, end
+
+
 def accuracy_plot(picture: RunPicture, limit_mm: float | None) -> PlotView:
-    """The predicted error at the worst task pose against the records, and what is still expected."""
-    known = tuple((float(records), forecast.now_mm) for records, forecast in picture.forecasts)
-    series = [Series("so far", "o", known)]
-    if picture.forecasts and picture.state.identified is None:
-        records, last = picture.forecasts[-1]
-        coming = ((float(records + last.records), last.end_mm),) if last.records else ()
-        series.append(Series("at the end", "x", coming))
-    title = "Predicted error, mm"
-    if picture.forecasts:
-        last = picture.forecasts[-1][1]
-        title = f"Predicted error {from_to(last.now_mm, last.end_mm)}"
+    """U at the worst task pose against the records, and what is still expected."""
+    known = [(float(records), *_now_and_end(forecast)) for records, forecast in picture.forecasts]
+    series = [Series("so far", "o", tuple((records, now) for records, now, _ in known))]
+    title = "U at the task, mm"
+    if known:
+        records, now, end = known[-1]
+        title = f"U at the task {from_to(now, end)}"
+        if picture.state.identified is None:
+            left = picture.forecasts[-1][1].records
+            series.append(Series("at the end", "x", ((records + left, end),) if left else ()))
     return PlotView(
         title=title,
         x_label="records",

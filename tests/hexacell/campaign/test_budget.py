@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from hexacell.campaign.budget import MOST_SHARE, Budget, paid_sizes, shared_sizes
 from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.time_model import (
-    MOVE_OVERHEAD_S,
+    USUAL,
+    Overheads,
     TimeKind,
     TimeModel,
     calibration_seconds,
@@ -18,7 +19,7 @@ from hexacell.campaign.time_model import (
     planned_records,
     seconds_beside,
 )
-from hexacell.dry_run.campaign import VirtualCampaign
+from hexacell.dry_run.campaign import VirtualCampaign, dry_run
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.motion.durations import SpeedLimits, line_duration
@@ -26,7 +27,14 @@ from hexacell.robot.virtual_robot import VirtualRobot
 
 SLOW = SpeedLimits(joint=25.0, edge_mm_s=25.0)
 TIMES = TimeModel(
-    place_s=300.0, trial_s=5.0, station_s=30.0, reading_s=1.0, move_s=29.0, wide_move_s=9.0, speeds=SLOW
+    place_s=300.0,
+    trial_s=5.0,
+    station_s=30.0,
+    reading_s=1.0,
+    move_s=29.0,
+    wide_move_s=9.0,
+    speeds=SLOW,
+    overheads=USUAL,
 )
 
 
@@ -56,16 +64,32 @@ def test_the_tighter_of_records_and_minutes_holds(most_records, most_minutes, re
 def test_durations_of_a_cell(make_plan):
     by_hand = {"stations__placement": "by-hand", "identification__minutes_per_station": 7.0}
     assert TimeModel.of(make_plan(**by_hand).settings).place_s == 420.0
-    fixed = TimeModel.of(make_plan().settings)
-    assert fixed.place_s == 0.0, "fixed gauges are not carried"
-    untried = TimeModel.of(make_plan(stations__trial_mm=0.0).settings)
+    carried, fixed = TimeModel.of(make_plan(**by_hand).settings), TimeModel.of(make_plan().settings)
+    assert fixed.place_s == fixed.trial_s == 0.0, "fixed gauges are not carried, and tried once"
+    untried = TimeModel.of(make_plan(stations__trial_mm=0.0, **by_hand).settings)
     assert untried.trial_s == 0.0
-    assert fixed.station_s == pytest.approx(untried.station_s + fixed.trial_s)
+    assert carried.station_s == pytest.approx(untried.station_s + carried.trial_s)
+    once, never = (
+        sum(seconds_beside(make_plan(stations__trial_mm=size).settings).values()) for size in (1.0, 0.0)
+    )
+    assert once - never == pytest.approx(carried.trial_s)
     slow, fast = (
         TimeModel.of(make_plan(speed__joint_at_gauges=speed, speed__edge_at_gauges_mm_s=speed).settings)
         for speed in (10.0, 40.0)
     )
-    assert slow.move_s - MOVE_OVERHEAD_S == pytest.approx(4.0 * (fast.move_s - MOVE_OVERHEAD_S))
+    assert slow.move_s - USUAL.move_s == pytest.approx(4.0 * (fast.move_s - USUAL.move_s))
+
+
+def test_a_cell_takes_what_its_own_run_took(make_plan):
+    plan, own = make_plan(), Overheads(move_s=1.3, reading_s=0.8)
+    usual, slower = dry_run(plan), dry_run(plan, own)
+    assert slower.records == usual.records
+    readings = slower.seconds[TimeKind.READING] - usual.seconds[TimeKind.READING]
+    moves = slower.seconds[TimeKind.MOVING] - usual.seconds[TimeKind.MOVING]
+    assert readings > 0.5 * slower.records
+    assert moves > 1.0 * slower.records
+    by_hand = make_plan(stations__placement="by-hand").settings
+    assert TimeModel.of(by_hand, Overheads(place_s=50.0)).place_s == 50.0
 
 
 def test_a_calibration_takes_what_its_parts_take(make_plan):
@@ -112,7 +136,7 @@ def test_ways_between_records_say_how_long_the_next_ones_take(make_plan):
     assert between.reading_s == times.reading_s
     start, end = poses[:2]
     exact = line_duration(robot.mechanism, robot.controller, robot.branch, start, end, times.speeds)
-    assert between.move_s == pytest.approx(exact + MOVE_OVERHEAD_S, rel=0.1)
+    assert between.move_s == pytest.approx(exact + USUAL.move_s, rel=0.1)
 
 
 PLANNED = {1: 11, 2: 11, 3: 11, 4: 11, 5: 11}

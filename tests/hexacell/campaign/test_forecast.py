@@ -8,15 +8,17 @@ import pytest
 from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.forecast import PlannedInformation
 from hexacell.campaign.task_accuracy import planned_budget
-from hexacell.campaign.time_model import TimeKind, seconds_beside
+from hexacell.campaign.time_model import TimeKind, TimeModel, seconds_beside
 from hexacell.cell.uncertainty import UncertaintySettings
 from hexacell.config.interface import ControllerGeometry
 from hexacell.design.criteria import add_information
 from hexacell.dry_run.campaign import VirtualCampaign, dry_run
 from hexacell.identification.diagnostics.pose_accuracy import predicted_accuracy
 from hexacell.identification.estimator import estimate_online
-from hexacell.kinematics.pose import Pose
+from hexacell.kinematics import rotations
+from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.motion.durations import line_durations
 from hexacell.robot.model import make_robot
 from hexacell.robot.stated import stated_effects
 from hexacell.robot.virtual_robot import VirtualRobot, exact_records, robots_within_tolerances
@@ -214,6 +216,19 @@ def test_minutes_are_of_everything_that_is_measured(result):
     by_hand = dry_run(at_two_points(**SEED, stations__placement="by-hand"))
     placing_s = by_hand.seconds[TimeKind.PLACING]
     assert placing_s == (2 + 2 * 3) * 60.0 * plan.settings.identification.minutes_per_station
+
+
+def test_wide_moves_take_what_their_lines_do():
+    plan = at_two_points(**SEED)
+    times, robot = TimeModel.of(plan.settings), plan.robot
+    ball = robot.from_commands([plan.reference_pose(1)]).positions[0]
+    tilted = rotations.from_vector(np.radians([[0.0, 0.0, 0.0], [8.0, 0.0, 0.0]]))
+    poses = PoseBatch.at(ball, tilted)
+    wide = times.between_held_out(robot, [poses])
+    geometry = robot.mechanism, robot.commanding, robot.branch
+    line_s = line_durations(*geometry, poses[:1], poses[1:], times.speeds)[0]
+    assert wide.wide_move_s == pytest.approx(times.overheads.move_s + line_s, rel=0.05)
+    assert wide.station_s - times.station_s == pytest.approx(wide.wide_move_s - times.wide_move_s)
 
 
 def test_the_course_is_what_fewer_minutes_would_have_given(result):

@@ -148,12 +148,12 @@ def test_a_point_is_not_begun_for_a_single_record(campaign):
 
 def test_the_plan_finishes_when_the_target_is_reached(carry_out, campaign):
     errors = forecasts_of(campaign)
-    target = 0.5 * (errors[-3].now_mm + errors[-2].now_mm)
+    target = 0.5 * sum(one.expanded_mm(one.now_mm) for one in errors[-3:-1])
     plan = at_two_points(identification__target_mm=target)
     taken = carry_out(plan)
     assert len(records_of(taken)) == 14
     assert isinstance(taken[-1].decision, Finished)
-    assert taken[-1].decision.reason.startswith("the predicted error at the task poses is ")
+    assert taken[-1].decision.reason.startswith("U at the task poses is ")
 
 
 def test_points_are_chosen_by_their_gain_per_minute(make_plan, carry_out):

@@ -13,6 +13,7 @@ from hexacell.dry_run.verdict_forecast import (
     SEED,
     VerdictForecast,
     forecast_verdicts,
+    predicted_held_out_sets,
     predicted_verdicts,
     stated_errors,
     with_held_out_records,
@@ -48,7 +49,8 @@ class Cell:
         )
         campaign.carry_out()
         self.found = self.plan.estimate(campaign.state).identification
-        self.updated = with_held_out_records(self.plan, self.found)
+        self.sets = predicted_held_out_sets(self.plan, self.found)
+        self.updated = with_held_out_records(self.plan, self.found, self.sets)
         self.first, self.second = (self.budget(one) for one in (self.found, self.updated))
 
     def budget(self, found):
@@ -96,7 +98,7 @@ def simulated(cell):
 
 @pytest.fixture(scope="module")
 def forecast(cell):
-    return predicted_verdicts(cell.plan, cell.found, cell.first)
+    return predicted_verdicts(cell.plan, cell.found, cell.first, cell.sets)
 
 
 @pytest.mark.slow
@@ -161,5 +163,7 @@ def test_without_held_out_poses_nothing_is_forecast(cell) -> None:
     settings = cell.plan.settings
     far = settings.verification.model_copy(update={"points": ((5000.0, 0.0, 550.0),)})
     plan = replace(cell.plan, settings=settings.model_copy(update={"verification": far}))
-    assert predicted_verdicts(plan, cell.found, cell.first) is None
-    assert predicted_verdicts(cell.plan, cell.found, None) is None
+    sets = predicted_held_out_sets(plan, cell.found)
+    assert not sets
+    assert predicted_verdicts(plan, cell.found, cell.first, sets) is None
+    assert predicted_verdicts(cell.plan, cell.found, None, cell.sets) is None

@@ -11,7 +11,12 @@ from hexacell.campaign.planner import Plan
 from hexacell.cell.loader import load_cell
 from hexacell.cell.model import CellSettings
 from hexacell.dry_run.campaign import VirtualCampaign
-from hexacell.dry_run.verdict_forecast import predicted_verdicts, stated_errors, with_held_out_records
+from hexacell.dry_run.verdict_forecast import (
+    predicted_held_out_sets,
+    predicted_verdicts,
+    stated_errors,
+    with_held_out_records,
+)
 from hexacell.identification.estimator import identify
 from hexacell.identification.identified_zeros import IdentifiedZeros
 from hexacell.identification.solver.result import Identification
@@ -82,7 +87,8 @@ def test_the_verdict_is_forecast(as_drawn: Measured, roughly_built: Measured) ->
     """Zeros serve a machine whose joints are as drawn, and none whose joints are 2 mm off."""
     probabilities = []
     for one in (as_drawn, roughly_built):
-        told = predicted_verdicts(one.plan, one.found, one.budget(one.found, one.zeros))
+        sets = predicted_held_out_sets(one.plan, one.found)
+        told = predicted_verdicts(one.plan, one.found, one.budget(one.found, one.zeros), sets)
         assert told is not None
         probabilities.append(told.probabilities[Verdict.PASS])
     assert probabilities[0] > 0.99
@@ -92,7 +98,8 @@ def test_the_verdict_is_forecast(as_drawn: Measured, roughly_built: Measured) ->
 def test_errors_are_stated_as_of_machines_that_are_drawn(roughly_built: Measured) -> None:
     """Each identified twice, with and without the held-out records; zeros of the first are written."""
     found, zeros = roughly_built.found, roughly_built.zeros
-    updated = with_held_out_records(roughly_built.plan, found)
+    sets = predicted_held_out_sets(roughly_built.plan, found)
+    updated = with_held_out_records(roughly_built.plan, found, sets)
     second = roughly_built.budget(updated)
     stated = stated_errors(found, updated, roughly_built.budget(found, zeros), second, zeros)
     prior, random = found.problem.prior, np.random.default_rng(5)

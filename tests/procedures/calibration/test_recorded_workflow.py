@@ -143,7 +143,7 @@ def moves(recording):
 
 def test_with_the_target_reached_the_set_is_closed_and_the_geometry_identified(recording, make_rig, story):
     step, before = [*moves(recording)][-2]
-    now = step.expected.forecast.now_mm
+    now = step.expected.forecast.expanded_mm(step.expected.forecast.now_mm)
     assert next_step(make_rig(identification__target_mm=0.99 * now).calibration, fold(before)) is not None
     rig = make_rig(identification__target_mm=1.01 * now)
     back = next_step(rig.calibration, fold(before))
@@ -153,7 +153,7 @@ def test_with_the_target_reached_the_set_is_closed_and_the_geometry_identified(r
     at_reference = [*before, story(point=2).arrived(1)]
     closing = next_step(rig.calibration, fold(at_reference))
     assert closing == CloseSet(at=step.at, reason=closing.reason)
-    assert closing.reason.startswith("the predicted error at the task poses is")
+    assert closing.reason.startswith("U at the task poses is")
     assert next_step(rig.calibration, fold([*at_reference, story(point=2).closed()])).key == "identify"
 
 

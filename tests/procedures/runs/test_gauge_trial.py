@@ -36,12 +36,15 @@ async def test_a_mistake_is_named_at_the_first_station(make_rig, mistake: str) -
     assert happened(rig, events.Interrupted)[-1].exit_code == ExitCode.HARDWARE
 
 
-async def test_every_station_is_tried_once(recording, replayed) -> None:
-    rig = replayed(recording.until(events.Identified), stations__trial_mm=1.0)
+@pytest.mark.parametrize("placement", ["by-hand", "fixed"])
+async def test_every_station_is_tried_once_and_fixed_gauges_at_the_first(recording, replayed, placement):
+    stations = {"stations__trial_mm": 1.0, "stations__placement": placement}
+    rig = replayed(recording.until(events.Identified), **stations)
     ended = await rig.run()
     assert ended.exit_code == ExitCode.DONE
     tried = [str(event.at) for event in happened(rig, events.GaugesTried)]
-    assert tried == ["before-V1", "before-V2", "after-V1", "after-V2"]
+    every = ["before-V1", "before-V2", "after-V1", "after-V2"]
+    assert tried == (every if placement == "by-hand" else every[:1])
     assert len(happened(rig, events.GaugesProbed)) == 3 * len(tried)
     first = happened(rig, events.GaugesTried)[0].at
     trial = [f"{first}/o01/sample", *[f"{first}/o00/move", f"{first}/probe"] * 3]

@@ -212,7 +212,9 @@ class SetSteps:
     def _trial(self, state: RunState, key: SetKey, ball: Array | None) -> Step | None:
         """The next step of a trial; None if none is due."""
         measured = state.set(key)
-        is_passed = measured.tried or (state.gauges_tried and are_fixed(self.settings, key))
+        # On the seats of a length check gauges are mounted one by one.
+        have_stayed = are_fixed(self.settings, key) and key.phase is not Phase.LENGTH
+        is_passed = measured.tried or (state.gauges_tried and have_stayed)
         if not self.trial_mm or is_passed or not measured.samples:
             return None
         rounds, axis = divmod(len(measured.probes), AXES)

@@ -159,7 +159,7 @@ def test_longer_readings_help_against_noise_from_reading_to_reading_alone(plan) 
         ({"acceptance.position_mm": 0.2}, 4),
         ({"acceptance.position_mm": 2.0}, 1),
         ({"identification.target_mm": 0.02}, 4),
-        ({"identification.target_mm": 0.3, "acceptance.position_mm": 0.2}, 1),
+        ({"identification.target_mm": 0.6, "acceptance.position_mm": 0.2}, 1),
         ({"identification.budget_minutes": 2.5, "acceptance.position_mm": 0.2}, 1),
     ],
 )

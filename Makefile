@@ -66,7 +66,7 @@ docs: venv
 # is made by what. The study of designs takes seven minutes on two cores.
 figures: venv
 	HEXACELL_UPDATE_SNAPSHOTS=1 $(RUN) pytest -q tests/screen/test_snapshots.py tests/docs/test_howto_pictures.py
-	for cell in simulated-hexaglide gough-stewart linapod rotary-cranks; do \
+	for cell in simulated-hexaglide gough-stewart linapod rotary-cranks five-legs four-arms; do \
 		.venv/bin/hexacell view configs/$$cell.toml --output docs/robot-$$cell.svg --no-open; done
 	rm -rf build/study
 	.venv/bin/hexacell study paper --folder build/study

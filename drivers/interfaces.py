@@ -46,9 +46,9 @@ class GaugeReading:
 
 @dataclass(frozen=True, slots=True)
 class EncoderSample:
-    """Six joint variables ``positions`` (6,) sampled at one instant, in ``unit``, mm or deg.
+    """Joint variables ``positions`` (J,) sampled at one instant, in ``unit``, mm or deg.
 
-    ``counts`` (6,) are the raw ones, as the encoders send them.
+    ``counts`` (J,) are the raw ones, as the encoders send them.
     """
 
     counts: tuple[int, ...]
@@ -94,7 +94,7 @@ class ControllerStatus:
 class ReportedPosition:
     """Where a controller has the robot: its pose by its own forward kinematics, mm and deg.
 
-    ``joints`` are its joint variables (6,), mm or deg; None where its protocol does not report them.
+    ``joints`` are its joint variables (J,), mm or deg; None where its protocol does not report them.
     """
 
     pose: Pose
@@ -144,10 +144,10 @@ class Gauge(Device[DeviceIdentity], Protocol):
 
 
 class EncoderBank(Device[tuple[DeviceIdentity, ...]], Protocol):
-    """Six encoders of the joints that are sampled simultaneously."""
+    """Encoders of the joints that are sampled simultaneously."""
 
     async def read(self) -> EncoderSample:
-        """One complete sample of all six encoders, all of the same instant."""
+        """One complete sample of all encoders, all of the same instant."""
 
 
 class Controller(Device[DeviceIdentity], Protocol):

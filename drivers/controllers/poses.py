@@ -1,13 +1,28 @@
 """Whether a controller is where it should be, by what it reports."""
 
 import math
+from collections.abc import Sequence
 
 from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError
-from hexacell.kinematics.pose import Pose
+from hexacell.kinematics.pose import AXES, Pose
 
 _ASIDE_MM, _ASIDE_SHARE = 5.0, 0.05
 """How much longer than a straight move the way over a pose on it may be, also as a share of it."""
+
+
+def on_wire(pose: Pose, coordinates: str) -> list[float]:
+    """Those coordinates of a pose that a robot has, mm and deg."""
+    return [value for axis, value in zip(AXES, pose.as_tuple(), strict=True) if axis in coordinates]
+
+
+def from_wire(numbers: Sequence[float], coordinates: str) -> Pose:
+    """The pose of as many numbers as the robot has coordinates; the others are 0, and mean nothing.
+
+    Raises:
+        ValueError: there are more or fewer.
+    """
+    return Pose(**{**dict.fromkeys(AXES, 0.0), **dict(zip(coordinates, numbers, strict=True))})
 
 
 def pose_difference(one: Pose, other: Pose) -> tuple[float, float]:
@@ -18,8 +33,9 @@ def pose_difference(one: Pose, other: Pose) -> tuple[float, float]:
 
 
 def agree(one: Pose, other: Pose, settings: ControllerSettings, tolerances: float = 1.0) -> bool:
-    """Whether two poses are the same within so many tolerances of the cell file."""
-    position, angle = pose_difference(one, other)
+    """Whether two poses are the same within so many tolerances, in the coordinates that the robot has."""
+    own = settings.coordinates
+    position, angle = pose_difference(*(from_wire(on_wire(pose, own), own) for pose in (one, other)))
     return (
         position <= tolerances * settings.position_tolerance_mm
         and angle <= tolerances * settings.angle_tolerance_deg

@@ -1,4 +1,4 @@
-"""Six CANopen encoders (CiA 406), sampled simultaneously: one SYNC, six positions."""
+"""CANopen encoders (CiA 406), sampled simultaneously: one SYNC, a position of each."""
 
 import threading
 from dataclasses import replace

@@ -17,8 +17,7 @@ from drivers.encoders.bank import joint_variables
 from drivers.errors import NotHomedError
 from drivers.interfaces import DeviceIdentity, EncoderSample
 from hexacell.cell.devices import OF_CONTROLLER, EncoderSettings
-from hexacell.errors import UsageError
-from hexacell.kinematics.parameters import LEGS
+from hexacell.errors import DeviceError, UsageError
 
 Zeros = Callable[[], Sequence[float]]
 """By how much the joints that a controller reports exceed what its encoders show; raises ``FileError``."""
@@ -29,7 +28,7 @@ class JointPositions(Protocol):
     """A controller that reports where its joints are, also during a move."""
 
     async def joints_now(self) -> tuple[float, ...] | None:
-        """The six joints, in the unit of the joint variables; None before they are homed."""
+        """The joints, in the unit of the joint variables; None before they are homed."""
 
 
 class ControllerScales:
@@ -38,9 +37,7 @@ class ControllerScales:
     Raises ``UsageError`` for a controller that does not report its joints.
     """
 
-    def __init__(
-        self, settings: EncoderSettings, controller: object, zeros: Zeros = lambda: (0.0,) * LEGS
-    ) -> None:
+    def __init__(self, settings: EncoderSettings, controller: object, zeros: Zeros | None = None) -> None:
         if not isinstance(controller, JointPositions):
             raise UsageError(
                 "the controller does not report where its joints are",
@@ -48,18 +45,25 @@ class ControllerScales:
             )
         self._settings = settings
         self._controller = controller
-        self._zeros = zeros
+        self._zeros = zeros or (lambda: (0.0,) * len(settings.offset))
 
     async def open(self) -> tuple[DeviceIdentity, ...]:
         """One identity a leg; nothing is asked."""
         return tuple(
             DeviceIdentity(f"encoder of leg {leg}", OF_CONTROLLER, "as the controller reports its joints")
-            for leg in range(1, LEGS + 1)
+            for leg in range(1, len(self._settings.offset) + 1)
         )
 
     async def read(self) -> EncoderSample:
         """One sample; raises ``NotHomedError``, ``DeviceError``, or ``FileError`` if no zeros are known."""
         joints = await self._controller.joints_now()
+        legs = len(self._settings.offset)
+        if joints is not None and len(joints) != legs:
+            raise DeviceError(
+                f"reports {len(joints)} joints, and the robot has {legs}",
+                subject="controller",
+                action="Correct robot.mechanism in the cell file, or the controller's joints",
+            )
         if joints is None:
             raise NotHomedError(
                 "are not homed: what the controller reports of its joints is not a position yet",

@@ -69,7 +69,7 @@ class SimulatedSensors(ServedGroup):
 def encoder_bank(
     encoders: EncoderSettings, positions: Positions, clock: CellClock, latency_s: float = 0.0
 ) -> SimulatedEncoderBank | SimulatedDbcBank | SimulatedModbusBank:
-    """The six encoders that the settings describe, served; ``address`` is where a driver finds them."""
+    """The encoders that the settings describe, served; ``address`` is where a driver finds them."""
     if encoders.modbus is not None:
         return SimulatedModbusBank(encoders, encoders.modbus, positions, clock, latency_s)
     if encoders.dbc is not None:

@@ -43,7 +43,10 @@ class CellFaults:
         }
         self._switches: dict[str, Mapping[FaultKind, Switch]] = {
             **{name: gauges.faults(name) for name in gauges.indicators},
-            **{f"encoder {leg}": encoders.faults(leg) for leg in range(1, 7)},
+            **{
+                f"encoder {leg}": encoders.faults(leg)
+                for leg in range(1, machine.mechanism.joint_count + 1)
+            },
             "controller": of_cell | of_controller,
             "stop line": of_cell,
             "": of_cell,

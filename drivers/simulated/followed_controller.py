@@ -21,7 +21,7 @@ from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
 from hexacell.config.layout import ConfigLayout, fingerprint
 from hexacell.errors import FileError, UsageError
-from hexacell.kinematics.parameters import LEGS
+from hexacell.kinematics.parameters import CONSTRAINTS
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from hexacell.storage.atomic_files import read_bytes, write_own
@@ -94,9 +94,9 @@ def joints_in(line: str) -> Array | None:
         numbers = np.array([float(word) for word in line.split()])
     except ValueError:
         return None
-    if len(numbers) not in {LEGS, LEGS + 1} or not np.isfinite(numbers).all():
+    if len(numbers) not in {CONSTRAINTS, CONSTRAINTS + 1} or not np.isfinite(numbers).all():
         return None
-    return numbers[:LEGS] if numbers[LEGS:].all() else None
+    return numbers[:CONSTRAINTS] if numbers[CONSTRAINTS:].all() else None
 
 
 class FollowingPhysics(RobotPhysics):

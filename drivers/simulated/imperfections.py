@@ -46,7 +46,7 @@ class Backlash:
     def __init__(self, gaps: Array, joints: Array, random: np.random.Generator) -> None:
         """Where the joints came from at first is unknown: they are anywhere in their gaps."""
         self._half = 0.5 * gaps
-        self._joints = joints + self._half * random.uniform(-1.0, 1.0, 6)
+        self._joints = joints + self._half * random.uniform(-1.0, 1.0, len(joints))
 
     def follow(self, encoders: Array) -> Array:
         """The joints (6,) after their encoders have gone straight from where they were to a place."""
@@ -64,7 +64,7 @@ class LoadedMachine:
         self._play_mm = np.array(settings.legs.play_mm)
         self._mm_n = UM * np.array(settings.legs.compliance_um_n)
         self._yields = bool(settings.load.weight_n and (self._play_mm.any() or self._mm_n.any()))
-        self._longer = np.zeros(6)
+        self._longer = np.zeros(mechanism.joint_count)
 
     def warmer_k(self, elapsed_s: float) -> float:
         """By how much the machine is warmer some time after its start."""
@@ -75,7 +75,7 @@ class LoadedMachine:
         geometry, joints = self._expanded(joints[None], warmer_k)
         if not self._yields:
             return forward_kinematics(self._mechanism, geometry, joints, start)
-        longer, share, before = self._longer, 1.0, np.zeros(6)
+        longer, share, before = self._longer, 1.0, np.zeros_like(self._longer)
         for _ in range(MOST_ROUNDS):
             changed = with_longer_legs(self._mechanism, geometry, joints, start, longer)
             found = forward_kinematics(self._mechanism, *changed, start)

@@ -194,10 +194,11 @@ class RobotPhysics:
         self._shown_per_mm = 1.0 + 1e-6 * settings.encoders.common_scale_um_m
         shown = inverse_kinematics(mechanism, commanding.geometry, commanding.branch, start)
         joints = shown / self._shown_per_mm
+        self._legs = mechanism.joint_count
         self._motion = Motion(joints[[0, 0]], -1e9, 0.0)  # standstill
         self._rows_passed = self._moves = 0
         self.commands_differ = False
-        self._unseen = np.zeros(6), np.zeros(6)
+        self._unseen = np.zeros_like(joints[0]), np.zeros_like(joints[0])
         first = continue_solution(
             mechanism, self._truth, joints, start=start, start_geometry=commanding.geometry
         )
@@ -211,7 +212,7 @@ class RobotPhysics:
         self._random_walk, self._walked_mm = np.random.default_rng([settings.seed, 3]), np.zeros(3)
         gaps, of_its_own = np.array(settings.joints.backlash), np.random.default_rng([settings.seed, 2])
         self._backlash = Backlash(gaps, joints[0], of_its_own)
-        self._pose, self._joints, self._warmer_k = first.poses, np.full(6, np.nan), 0.0
+        self._pose, self._joints, self._warmer_k = first.poses, np.full_like(joints[0], np.nan), 0.0
         self._move_platform(joints[0])
         self.gauges = GaugePlaces(settings, fixture, self._random, self._pose.positions[0])
         self._draw_noise()
@@ -225,12 +226,12 @@ class RobotPhysics:
         with self._lock:
             distance = float(np.abs(np.diff(path, axis=0)).sum(axis=0).max())
             worn, self._moves = (1.0 + motion.growth_per_move) ** self._moves, self._moves + 1
-            scatter = worn * motion.repeatability * self._random.standard_normal(6)
+            scatter = worn * motion.repeatability * self._random.standard_normal(self._legs)
             actual = path / self._shown_per_mm + np.linspace(0.0, 1.0, len(path))[:, None] * scatter
             actual[0] = self._motion.joints(self._update())
             self._unseen = (
                 self._unseen[1],
-                worn * motion.unseen_repeatability * self._random_unseen.standard_normal(6),
+                worn * motion.unseen_repeatability * self._random_unseen.standard_normal(self._legs),
             )
             stated_s = 0.0 if duration_s is None else duration_s + RAMP_S
             duration = max(motion.minimum_s, distance / motion.speed, stated_s)
@@ -262,7 +263,7 @@ class RobotPhysics:
     def encoder_positions(self) -> Array:
         """The joint variables measured by the encoders (6,), mm."""
         with self._lock:
-            flicker = self._settings.encoders.flicker * self._random.standard_normal(6)
+            flicker = self._settings.encoders.flicker * self._random.standard_normal(self._legs)
             shown = self._shown_per_mm * self._motion.joints(self._clock.now())
             return shown + self._encoder_noise + flicker
 
@@ -287,7 +288,7 @@ class RobotPhysics:
         self._walked_mm = self._walked_mm + step_mm * self._random_walk.standard_normal(3)
         self._ringing_direction = self._random.standard_normal(3)
         self._gauge_noise = self._settings.gauges.noise_mm * self._random.standard_normal(3)
-        self._encoder_noise = self._settings.encoders.noise * self._random.standard_normal(6)
+        self._encoder_noise = self._settings.encoders.noise * self._random.standard_normal(self._legs)
 
     def _update(self) -> float:
         """Move the platform along the path of the joints since the last update."""

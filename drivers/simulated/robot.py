@@ -104,8 +104,9 @@ class SimulatedMachine:
 
     def __post_init__(self) -> None:
         self._geometry = self.layout.read(*self.config)
-        self._line = PoseBatch.of([self.start, self.start])
-        self._directions: Array = np.zeros((2, 6))
+        home = self.mechanism.completed(self._geometry.geometry, PoseBatch.of([self.start]))
+        self._line = home[[0, 0]]
+        self._directions: Array = np.zeros((2, self.mechanism.joint_count))
         self._lock = threading.Lock()
         self._stop_count = 0
         self._stopped = threading.Event()
@@ -126,11 +127,13 @@ class SimulatedMachine:
         stop_count = self._stop_count
         with self._lock:
             here, before = self._pose_now(), self._directions[self._place()[0] + 1]
-        line, joints = self._straight_line(here, PoseBatch.of([pose]))
+        target = self.mechanism.completed(self._geometry.geometry, PoseBatch.of([pose]))
+        line, joints = self._straight_line(here, target)
         if np.isnan(joints).any():
             raise MotionRefused("fails kinematicsInverse")
         directions = directions_on(joints, before)
-        joints = joints + 0.5 * np.array(self._geometry.corrections.backlash) * directions
+        backlash = np.array(self._geometry.corrections.backlash[: joints.shape[1]])
+        joints = joints + 0.5 * backlash * directions
         with self._lock:
             if self._stop_count != stop_count:
                 return
@@ -220,7 +223,9 @@ class SimulatedMachine:
         """Poses (n) on a line and their joints (n, 6), between which joints may go at one rate."""
         steps = LINE_STEPS  # by how joints bend without corrections: with play they jump in any segment
         while True:
-            line = interpolate_line(start, end, 2 * steps)
+            line = self.mechanism.completed(
+                self._geometry.geometry, interpolate_line(start, end, 2 * steps)
+            )
             joints = self._joints(line)
             error = np.abs(joints[1::2] - 0.5 * (joints[:-1:2] + joints[2::2])).max()
             if not error > LINE_MM or steps >= MOST_STEPS:

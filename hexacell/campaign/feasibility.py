@@ -299,7 +299,7 @@ def _of_legs(robot: Robot, poses: PoseBatch, joints: Array) -> Iterator[str]:
     if (limits := robot.limits.legs) is None:
         return
     legs = robot.mechanism.legs(robot.commanding, poses, joints)
-    spare = limits.margins(legs)[0, :12].reshape(2, 6)
+    spare = limits.margins(legs)[0, : 2 * len(limits.base_cones)].reshape(2, -1)
     stated = limits.base_cones, limits.platform_cones
     for where, cones, left in zip(("base", "platform"), stated, spare, strict=True):
         if left.min() < 0.0:

@@ -18,7 +18,8 @@ from pydantic import Field, ValidationError, create_model
 from pydantic_core import PydanticUndefined
 
 from hexacell.cell.devices import EncoderSettings, LinearEncoderSettings, RotaryEncoderSettings
-from hexacell.cell.fields import GeometrySettings, InRange, NotNegative, Positive, Section
+from hexacell.cell.fields import GeometrySettings, InRange, NotNegative, Positive, Section, Text
+from hexacell.cell.joint_count import for_joints
 from hexacell.cell.limits import LimitSettings, SpeedSettings
 from hexacell.cell.measuring import GuardSettings, NoiseSettings, TimingSettings
 from hexacell.cell.model import CellSettings, ToleranceSettings
@@ -38,7 +39,7 @@ from hexacell.cell.uncertainty import (
     UncertaintySettings,
 )
 from hexacell.kinematics.mechanism import Mechanism
-from hexacell.kinematics.parameters import LEGS, JointUnit, ParameterKind, ParameterSet
+from hexacell.kinematics.parameters import CONSTRAINTS, JointUnit, ParameterKind, ParameterSet
 
 SectionType = TypeVar("SectionType", bound=Section)
 
@@ -102,7 +103,11 @@ def cell_model(
         uncertainty = LinearUncertaintySettings
     if options is not ControllerOptions:
         controller = _derived(controller, options=_options_field(options))
-    return _derived(
+    if found.joint_count < CONSTRAINTS:
+        taken = copy(ControllerSettings.model_fields["coordinates"])
+        taken.default = found.coordinates
+        controller = _derived(controller, coordinates=(Text, taken))
+    model = _derived(
         CellSettings,
         uncertainty=(uncertainty, uncertainty()),
         robot=(robot, ...),
@@ -120,6 +125,7 @@ def cell_model(
             model=ModelSettings,
         ),
     )
+    return model if found.joint_count == CONSTRAINTS else for_joints(model, found.joint_count)
 
 
 def _options_field(options: type[ControllerOptions]) -> tuple[type[ControllerOptions], Any]:
@@ -140,7 +146,7 @@ def geometry_settings(parameters: ParameterSet) -> type[GeometrySettings]:
     """The section for a geometry of these parameters."""
     fields: dict[str, Any] = {}
     for kind in parameters.kinds:
-        default = ... if kind.default is None else (kind.default,) * LEGS
+        default = ... if kind.default is None else (kind.default,) * len(kind.owners)
         fields[kind.symbol] = (array_type(kind), Field(default, description=kind.meaning))
     return _derived(GeometrySettings, **fields)
 
@@ -158,7 +164,7 @@ def tolerance_settings(parameters: ParameterSet) -> type[ToleranceSettings]:
 
 
 def array_type(kind: ParameterKind) -> Any:  # noqa: ANN401 - a type made here
-    """The type of all numbers of a kind: a row for each leg, or a number."""
+    """The type of all numbers of a kind: its rows, or numbers."""
     made: Any = Positive if kind.is_positive else InRange
     for length in reversed(kind.shape):
         made = tuple.__class_getitem__((made,) * length)

@@ -170,9 +170,9 @@ class ModbusEncoderSettings(RegisterSettings):
     port: SerialPortName | None = key(None, "device path or pyserial URL of the line with all of them")
     serial: dict[str, Any] = key({}, "settings for pyserial; by default 19200 baud and even parity")
     devices: Six[ModbusAddress] = key(
-        (1, 1, 1, 1, 1, 1), "addresses of the devices with legs 1 to 6; one device may have several legs"
+        (1, 1, 1, 1, 1, 1), "addresses of the devices with the legs in order; one may have several legs"
     )
-    registers: Six[Register] = key(..., "first register of the position of legs 1 to 6, counted from 0")
+    registers: Six[Register] = key(..., "first register of the position of each leg, counted from 0")
     settle_s: NotNegative = key(BOOT_S, "how long devices may restart after the port was opened, s")
     bits: Literal[16, 32] = key(32, "bits of a position, in one or two registers")
     latch: LatchSettings | None = key(
@@ -202,8 +202,7 @@ class DbcSettings(Section):
 
     file: Text = key(..., "DBC file, relative to the cell file", min_length=1)
     signals: Six[MessageSignal] = key(
-        ...,
-        "signals with the positions of legs 1 to 6, as Message.Signal; their unit is that of the DBC file",
+        ..., "signals with the positions of the legs, as Message.Signal; their unit is that of the DBC file"
     )
     request: str | None = key(
         None,

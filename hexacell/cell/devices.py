@@ -25,7 +25,6 @@ from hexacell.cell.fields import (
     Section,
     SerialPortName,
     Six,
-    SixInRange,
     Text,
     accepted,
     broken_rule,
@@ -144,7 +143,7 @@ OF_CONTROLLER = "controller"
 
 
 class EncoderSettings(Section, ABC):
-    """The bank of six joint encoders, but for what a count is; ``unit`` is that of the joint variables."""
+    """The bank of joint encoders, but for what a count is; ``unit`` is that of the joint variables."""
 
     unit: ClassVar[JointUnit]
 
@@ -152,12 +151,14 @@ class EncoderSettings(Section, ABC):
         "cia406", "protocol of the encoders: cia406, controller, dbc, modbus, or one that a plug-in adds"
     )
     bus: dict[str, Any] | None = key(None, "settings for python-can's Bus")
-    nodes: Six[NodeId] = key((1, 2, 3, 4, 5, 6), "CANopen node ids of legs 1 to 6, each from 1 to 127")
+    nodes: Six[NodeId] = key((1, 2, 3, 4, 5, 6), "CANopen node ids of the legs in order, from 1 to 127")
     signed: bool = key(True, "whether positions are I32 (linear devices) rather than U32")
     direction: Six[Direction] = key(
         (1, 1, 1, 1, 1, 1), "sense of each encoder: 1 if counts grow with the joint variable, else -1"
     )
-    offset: SixInRange = key((0.0, 0.0, 0.0, 0.0, 0.0, 0.0), "joint variable at count 0", alias="offset_mm")
+    offset: Six[InRange] = key(
+        (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), "joint variable at count 0", alias="offset_mm"
+    )
     serial_numbers: Six[Unsigned] | None = key(
         None, "serial number of each node, object 1018h:4; another device is refused"
     )
@@ -175,9 +176,7 @@ class EncoderSettings(Section, ABC):
     )
     dbc: DbcSettings | None = key(None, "messages of encoders of protocol dbc")
     modbus: ModbusEncoderSettings | None = key(None, "registers of encoders of protocol modbus")
-    certificate: CertificateSettings | None = key(
-        None, "certificate of the calibration of all six encoders"
-    )
+    certificate: CertificateSettings | None = key(None, "certificate of the calibration of all encoders")
 
     @field_validator("nodes")
     @classmethod
@@ -211,7 +210,7 @@ class EncoderSettings(Section, ABC):
 
 
 class LinearEncoderSettings(EncoderSettings):
-    """The bank of six encoders of joints that slide, or of legs."""
+    """The bank of encoders of joints that slide, or of legs."""
 
     unit: ClassVar[JointUnit] = JointUnit.MM
 
@@ -227,7 +226,7 @@ class LinearEncoderSettings(EncoderSettings):
 
 
 class RotaryEncoderSettings(EncoderSettings):
-    """The bank of six encoders of joints that turn."""
+    """The bank of encoders of joints that turn."""
 
     unit: ClassVar[JointUnit] = JointUnit.DEG
 

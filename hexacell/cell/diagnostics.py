@@ -29,7 +29,8 @@ def _without_none(annotation: object) -> object:
     if get_origin(annotation) is Annotated:
         return get_args(annotation)[0]
     if get_origin(annotation) in {Union, UnionType}:
-        return next(option for option in get_args(annotation) if option is not type(None))
+        options = (option for option in get_args(annotation) if option is not type(None))
+        return _without_none(next(options))
     return annotation
 
 

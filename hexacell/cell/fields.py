@@ -149,24 +149,31 @@ Day = Annotated[date, BeforeValidator(_a_day)]
 Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
 Point = tuple[Finite, Finite, Finite]
 Item = TypeVar("Item")
-Six = tuple[Item, Item, Item, Item, Item, Item]
-"""One each of the six legs or axes."""
-SixNumbers = Six[Finite]
+OF_JOINTS = "one of each joint"
+"""Marks what has as many items as the mechanism joints (:mod:`hexacell.cell.joint_count`)."""
+
+Six = Annotated[tuple[Item, Item, Item, Item, Item, Item], OF_JOINTS]
+"""One of each joint: six, or as many as the mechanism has."""
+SixNumbers = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
+"""A pose."""
+JointNumbers = Annotated[tuple[Finite, ...], Field(min_length=4, max_length=6)]
 
 
-def _for_each(given: object) -> object:
+def _for_each(given: object, count: int) -> object:
     if isinstance(given, int | float) and not isinstance(given, bool):
-        return (_not_negative(float(given)),) * 6
+        return (_not_negative(float(given)),) * count
     return tuple(given) if isinstance(given, list) else given
 
 
 SixAlike = Annotated[
-    Six[NotNegative], BeforeValidator(_for_each, json_schema_input_type=NotNegative | Six[NotNegative])
+    Six[NotNegative],
+    BeforeValidator(partial(_for_each, count=6), json_schema_input_type=NotNegative | Six[NotNegative]),
 ]
-"""Six numbers, or one for all of them; a default that is one number needs ``validate_default``."""
+"""A number of each joint, or one for all; a default that is one number needs ``validate_default``."""
 PointInRange = tuple[InRange, InRange, InRange]
 Direction = Annotated[PointInRange, AfterValidator(_a_direction)]
-SixInRange = Six[InRange]
+SixInRange = tuple[InRange, InRange, InRange, InRange, InRange, InRange]
+"""A pose in a cell file."""
 
 
 class Frozen(BaseModel):

@@ -1,5 +1,6 @@
 """Section of the cell file on the limits of motion: of commands, joint variables, joints and legs."""
 
+from functools import partial
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
@@ -18,7 +19,6 @@ from hexacell.cell.fields import (
     outside,
 )
 from hexacell.kinematics.commanded_motion import RefusedCommand
-from hexacell.kinematics.parameters import LEGS
 
 MOST_EXCLUSIONS = 100
 
@@ -34,16 +34,16 @@ def _ordered(limits: tuple[float, float]) -> tuple[float, float]:
     return limits
 
 
-def _of_all_or_of_each(given: Any) -> Any:  # noqa: ANN401 - what pydantic hands on
-    each = given if isinstance(given, list | tuple) else [given] * LEGS
-    if len(each) != LEGS or not all(type(one) in {int, float} and 0 < one <= 180 for one in each):
-        raise outside(f"an angle above 0, to 180, or a list of {LEGS} of them, one a leg")
+def _of_all_or_of_each(given: Any, count: int) -> Any:  # noqa: ANN401 - what pydantic hands on
+    each = given if isinstance(given, list | tuple) else [given] * count
+    if len(each) != count or not all(type(one) in {int, float} and 0 < one <= 180 for one in each):
+        raise outside(f"an angle above 0, to 180, or a list of {count} of them, one a leg")
     return tuple(given) if isinstance(given, list) else given
 
 
 MinMax = Annotated[tuple[InRange, InRange], AfterValidator(_ordered)]
 Cone = Annotated[float, Field(gt=0, le=180)]
-Cones = Annotated[Cone | Six[Cone], BeforeValidator(_of_all_or_of_each)]
+Cones = Annotated[Cone | Six[Cone], BeforeValidator(partial(_of_all_or_of_each, count=6))]
 
 
 class AxisLimitSettings(Section):

@@ -154,11 +154,18 @@ class CellSettings(Section):
     @model_validator(mode="after")
     def _sections_fit_together(self) -> Self:
         """Each refusal is at its own place, which gives it its line."""
-        rules = (self._plungers, self._excluded, self._length_check, self._connections)
+        rules = (self._coordinates, self._plungers, self._excluded, self._length_check, self._connections)
         found = [InitErrorDetails(type=error, loc=at, input=None) for rule in rules for at, error in rule()]
         if found:
             raise ValidationError.from_exception_data(self.name, found)
         return self
+
+    def _coordinates(self) -> Refusals:
+        """The controller takes those of the mechanism."""
+        stated, own = self.controller.coordinates, self.mechanism.coordinates
+        if stated != own:
+            problem = f"{stated} are not the coordinates of {self.robot.mechanism}, which are {own}"
+            yield ("controller", "coordinates"), broken_rule(problem, f'Write coordinates = "{own}"')
 
     def _plungers(self) -> Refusals:
         plate, mounting = self.limits.gauge_travel_mm, self.stations.mounting_mm

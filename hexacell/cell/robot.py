@@ -23,9 +23,10 @@ from hexacell.cell.fields import (
     key,
 )
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.mechanism import Mechanism, with_coordinates
 from hexacell.kinematics.mechanisms.encoder_scales import WithEncoderScales
 from hexacell.kinematics.mechanisms.gough_stewart import GOUGH_STEWART_PARAMETERS, ScrewLegs
+from hexacell.kinematics.pose import AXES
 from hexacell.plugins import Group, created
 
 StartupWord = Literal["reset-estop", "switch-on", "home"]
@@ -89,7 +90,7 @@ class RobotSettings(Section):
 @cache
 def mechanism_of(name: str, *, encoder_scales: bool) -> Mechanism:
     """A mechanism, with errors of its encoders' scales or not; ``UsageError`` if it is not installed."""
-    found: Mechanism = created(Group.MECHANISMS, name)
+    found = with_coordinates(created(Group.MECHANISMS, name))
     return WithEncoderScales(found) if encoder_scales else found
 
 
@@ -132,6 +133,9 @@ class ControllerSettings(Section):
     )
     options: ControllerOptions = key(
         ControllerOptions(), "what this protocol needs beside the keys that all have"
+    )
+    coordinates: Text = key(
+        AXES, "those of a pose that the controller takes: xyzabc, or fewer where the mechanism has fewer"
     )
     host: Host = key("127.0.0.1", "network name or address of the controller")
     port: int | None = key(None, "TCP port of the controller", ge=1, le=65535)

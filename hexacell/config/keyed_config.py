@@ -23,7 +23,7 @@ from hexacell.config import interface
 from hexacell.errors import UsageError
 from hexacell.kinematics.corrections import Corrections
 from hexacell.kinematics.mechanism import Branch
-from hexacell.kinematics.parameters import LEGS, GeometricParameter, ParameterSet, ParameterUnit
+from hexacell.kinematics.parameters import GeometricParameter, ParameterSet, ParameterUnit
 
 Options = TypeVar("Options", bound=Section)
 
@@ -108,9 +108,11 @@ def _branch_of(parameters: ParameterSet, options: KeyedOptions) -> tuple[str, ..
             action="Name the config's signs there, or give them: branch = [1, 1, 1, -1, -1, -1]",
         )
     if isinstance(given, str):
-        return tuple(_filled(given, {"leg": leg, "index": leg - 1}) for leg in range(1, LEGS + 1))
+        return tuple(
+            _filled(given, {"leg": leg, "index": leg - 1}) for leg in range(1, parameters.legs + 1)
+        )
     if not set(given) <= {1, -1}:
-        raise UsageError("config_options: branch is not six times 1 or -1", action="Correct it")
+        raise UsageError("config_options: branch is not 1 or -1 for each leg", action="Correct it")
     return cast("Branch", given)
 
 

@@ -27,7 +27,7 @@ from hexacell.cell.fields import Text
 from hexacell.config.interface import NUMBER, NumberToken
 from hexacell.config.keyed_config import KeyedConfig, KeyedOptions, options_of
 from hexacell.errors import FileError, UsageError
-from hexacell.kinematics.parameters import LEGS, ParameterSet
+from hexacell.kinematics.parameters import ParameterSet
 
 BRANCH = "branch"
 _LEG = {"leg", "index", BRANCH}
@@ -84,7 +84,7 @@ def _templates(parameters: ParameterSet, lines: Iterable[str]) -> Iterator[_Line
         if unknown := sorted(fields - of_a_leg - {*parameters.names}):
             problem = f"config_options: {line!r} has {{{unknown[0]}}}, which is no parameter"
             raise UsageError(problem, action=f"A leg has {', '.join(sorted(of_a_leg))}")
-        for leg in range(1, LEGS + 1) if fields & of_a_leg else (1,):
+        for leg in range(1, parameters.legs + 1) if fields & of_a_leg else (1,):
             yield _template(line, leg, of_a_leg)
 
 

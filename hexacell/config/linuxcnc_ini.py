@@ -35,7 +35,7 @@ from hexacell.config.keyed_config import KeyedOptions, options_of
 from hexacell.config.linuxcnc_legs import LegCorrections
 from hexacell.errors import FileError
 from hexacell.kinematics.corrections import CorrectionKind, Corrections, Six
-from hexacell.kinematics.parameters import LEGS, ParameterSet
+from hexacell.kinematics.parameters import CONSTRAINTS, ParameterSet
 from hexacell.storage import atomic_files
 
 
@@ -212,7 +212,7 @@ class IniText:
             start += len(content) + 1
 
 
-JOINTS = tuple(f"JOINT_{leg}" for leg in range(LEGS))
+JOINTS = tuple(f"JOINT_{leg}" for leg in range(CONSTRAINTS))
 BACKLASH, COMP_FILE = "BACKLASH", "COMP_FILE"
 BACKLASH_DECIMALS = 6
 """1 nm."""

@@ -22,7 +22,7 @@ from hexacell.cell.fields import LARGEST_NUMBER
 from hexacell.config import interface
 from hexacell.config.keyed_config import KeyedConfig, NumberLookup
 from hexacell.kinematics.corrections import CorrectionKind, Corrections, Six, Three
-from hexacell.kinematics.parameters import LEGS
+from hexacell.kinematics.parameters import CONSTRAINTS
 
 UM = 1e-3
 
@@ -41,8 +41,8 @@ def _numbers(unit_mm: float) -> Iterator[tuple[str, _Number]]:
     """The pins of the component, in the order of :meth:`LegCorrections._values`."""
     play = _Number(-interface.LARGEST_PLAY_MM, interface.LARGEST_PLAY_MM, unit_mm)
     compliance = _Number(0.0, interface.LARGEST_COMPLIANCE_UM_N, unit_mm / UM)
-    yield from ((f"play.{leg}", play) for leg in range(LEGS))
-    yield from ((f"compliance.{leg}", compliance) for leg in range(LEGS))
+    yield from ((f"play.{leg}", play) for leg in range(CONSTRAINTS))
+    yield from ((f"compliance.{leg}", compliance) for leg in range(CONSTRAINTS))
     yield "weight", _Number(0.0)
     yield from ((f"weight-direction.{axis}", _Number(decimals=9)) for axis in "xyz")
     yield "weight-in-middle", _Number(0.0, 1.0)
@@ -63,8 +63,8 @@ class LegCorrections(KeyedConfig):
             token = lookup.number(self._directions[0])
             raise interface.token_error(token, "the weight has no direction", source, "State it")
         found = Corrections(
-            play_mm=cast("Six", tuple(legs[:LEGS])),
-            compliance_um_n=cast("Six", tuple(legs[LEGS:])),
+            play_mm=cast("Six", tuple(legs[:CONSTRAINTS])),
+            compliance_um_n=cast("Six", tuple(legs[CONSTRAINTS:])),
             weight_n=weight,
             weight_direction=cast("Three", tuple(one / length for one in direction)),
             weight_centre_mm=None if in_middle else cast("Three", tuple(centre)),

@@ -28,7 +28,7 @@ from hexacell.config.interface import (
     LARGEST_PLAY_MM,
     write_number,
 )
-from hexacell.kinematics.corrections import NONE, Corrections, Three
+from hexacell.kinematics.corrections import Corrections, Three
 from hexacell.storage.toml_document import KeyPath, TomlDocument
 
 TABLE = "corrections"
@@ -49,6 +49,8 @@ Play = Annotated[float, Field(ge=-LARGEST_PLAY_MM, le=LARGEST_PLAY_MM, allow_inf
 Compliance = Annotated[float, Field(ge=0.0, le=LARGEST_COMPLIANCE_UM_N, allow_inf_nan=False)]
 Model = TypeVar("Model", bound=Section)
 
+NO_NUMBERS = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
 
 class OfOwner(Section):
     """A table of the robot's owner, which may have other keys beside these."""
@@ -59,9 +61,9 @@ class OfOwner(Section):
 class TomlCorrections(Section):
     """The table; its keys are the fields of :class:`.Corrections`."""
 
-    backlash: Six[Backlash] = NONE
-    play_mm: Six[Play] = NONE
-    compliance_um_n: Six[Compliance] = NONE
+    backlash: Six[Backlash] = NO_NUMBERS
+    play_mm: Six[Play] = NO_NUMBERS
+    compliance_um_n: Six[Compliance] = NO_NUMBERS
     weight_n: NotNegative = 0.0
     weight_direction: Annotated[Direction, AfterValidator(_of_unit_length)] = (0.0, 0.0, -1.0)
     weight_centre_mm: PointInRange | None = None

@@ -23,7 +23,7 @@ import numpy as np
 from pydantic import AfterValidator, ValidationInfo, create_model, field_validator
 
 from hexacell.cell.by_mechanism import array_type
-from hexacell.cell.fields import InRange, Six, broken_rule, key, outside
+from hexacell.cell.fields import InRange, broken_rule, key, outside
 from hexacell.config.interface import ConfigPart, ControllerLimits, write_number
 from hexacell.config.layout import ConfigLayout, FormatOfFile
 from hexacell.config.toml_corrections import OfOwner, WithCorrections, validated, with_corrections
@@ -31,7 +31,7 @@ from hexacell.errors import UsageError
 from hexacell.kinematics.corrections import CorrectionKind, Corrections
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
-from hexacell.kinematics.parameters import LEGS, ParameterSet
+from hexacell.kinematics.parameters import ParameterSet
 from hexacell.storage.toml_document import KeyPath, TomlDocument
 
 
@@ -98,7 +98,9 @@ class NativeToml:
             names = {*section} if isinstance(section, dict) else set()
             has_branch = there.has_branch and "branch" in names | {*data}
             there = ParameterSet(tuple(kind for kind in there.kinds if kind.symbol in names), has_branch)
-        model = _model(there, branch_on_top="branch" in data, has_ranges=_has_ranges(data.get("axes")))
+        model = _model(
+            there, branch_on_top="branch" in data, has_ranges=_has_ranges(data.get("axes"), there.legs)
+        )
         return there, validated(document, model).model_dump()
 
 
@@ -107,11 +109,11 @@ def native_layout(parameters: ParameterSet) -> ConfigLayout:
     return ConfigLayout(parameters, (FormatOfFile("toml", NativeToml(parameters, {})),))
 
 
-def _has_ranges(axes: object) -> bool:
-    """Whether the six axes all state their range; otherwise they are the owner's own."""
+def _has_ranges(axes: object, legs: int) -> bool:
+    """Whether the axes all state their range; otherwise they are the owner's own."""
     return (
         isinstance(axes, list)
-        and len(axes) == LEGS
+        and len(axes) == legs
         and all(isinstance(axis, dict) and {"min", "max"} <= axis.keys() for axis in axes)
     )
 
@@ -122,7 +124,7 @@ def _a_sign(value: float) -> int:
     return int(value)
 
 
-Signs = Six[Annotated[InRange, AfterValidator(_a_sign)]]
+Sign = Annotated[InRange, AfterValidator(_a_sign)]
 
 
 class _Axis(OfOwner):
@@ -139,19 +141,19 @@ class _Axis(OfOwner):
         return value
 
 
-Ranges = Six[_Axis]
-
-
 @cache
 def _model(parameters: ParameterSet, *, branch_on_top: bool, has_ranges: bool) -> type[WithCorrections]:
-    """The model of such a file; the six signs are in ``[geometry]`` or at its top."""
+    """The model of such a file; the signs are in ``[geometry]`` or at its top."""
     geometry: dict[str, Any] = {
         kind.symbol: (array_type(kind), key(..., kind.meaning)) for kind in parameters.kinds
     }
-    whole: dict[str, Any] = {"axes": (Ranges, ...)} if has_ranges else {}
+    legs = parameters.legs
+    ranges: Any = tuple.__class_getitem__((_Axis,) * legs)
+    signs: Any = tuple.__class_getitem__((Sign,) * legs)
+    whole: dict[str, Any] = {"axes": (ranges, ...)} if has_ranges else {}
     if parameters.has_branch:
         place = whole if branch_on_top else geometry
-        place["branch"] = (Signs, key(..., "six signs: the solution of the inverse kinematics of each leg"))
+        place["branch"] = (signs, key(..., "signs: the solution of the inverse kinematics of each leg"))
     if geometry:
         whole["geometry"] = (create_model("Geometry", __base__=OfOwner, **geometry), ...)
     return create_model("NativeConfig", __base__=WithCorrections, **whole)

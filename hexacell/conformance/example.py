@@ -9,7 +9,7 @@ import numpy as np
 from hexacell.identification.problem.prior import Tolerances
 from hexacell.kinematics import rotations
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Branch, Mechanism
+from hexacell.kinematics.mechanism import Branch, Mechanism, with_coordinates
 from hexacell.kinematics.pose import FrameTransform, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import singularity_margin
@@ -41,6 +41,9 @@ class MechanismExample:
     tolerances: Mapping[str, float]
     tilt_deg: float = 20.0
 
+    def __post_init__(self) -> None:
+        with_coordinates(self.mechanism)
+
     @cached_property
     def widths(self) -> Tolerances:
         """The tolerances of the drawing."""
@@ -61,16 +64,17 @@ class MechanismExample:
         return PoseBatch.joined([self._poses_at(point, random) for point in self.points])
 
     def joints(self, geometry: Geometry, poses: PoseBatch | None = None) -> Array:
-        """Joint variables (n, 6) of a robot at the poses."""
+        """Joint variables (n, J) of a robot at the poses."""
         at = self.poses if poses is None else poses
         return self.mechanism.inverse(geometry, self.branch, at)
 
     def robots_in_reach(self) -> Iterator[tuple[Geometry, PoseBatch, Array]]:
-        """Each of the robots with the poses (n,) that it reaches, and its joint variables (n, 6) there."""
+        """Each of the robots with the poses (n,) that it reaches, and its joint variables (n, J) there."""
         for geometry in self.robots():
-            joints = self.joints(geometry)
+            poses = self.mechanism.completed(geometry, self.poses)
+            joints = self.joints(geometry, poses)
             reached = np.flatnonzero(np.isfinite(joints).all(axis=-1))
-            yield geometry, self.poses[reached], joints[reached]
+            yield geometry, poses[reached], joints[reached]
 
     def changes_of_frames(self) -> Iterator[FrameTransform]:
         """Changes that the mechanism's parameters can express: each axis alone, and all together."""
@@ -84,7 +88,8 @@ class MechanismExample:
         """Level, then at random orientations."""
         limit = np.radians(self.tilt_deg)
         angles = np.concatenate([np.zeros((1, 3)), random.uniform(-limit, limit, (TRIES, 3))])
-        poses = PoseBatch.at(np.asarray(point, dtype=float), rotations.from_angles(angles))
+        drawn = PoseBatch.at(np.asarray(point, dtype=float), rotations.from_angles(angles))
+        poses = self.mechanism.completed(self.drawing, drawn)
         poses = poses[np.flatnonzero(np.isfinite(self.joints(self.drawing, poses)).all(axis=-1))]
         margins = singularity_margin(self.mechanism, self.drawing, poses, self.joints(self.drawing, poses))
         clear = np.flatnonzero(margins > LEAST_MARGIN)[:TURNS]

@@ -1,5 +1,6 @@
 """Whether the frame convention of a mechanism removes exactly what the choice of frames explains."""
 
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -69,13 +70,14 @@ class FrameTests:
         example = self.example
         mechanism = example.mechanism
         for geometry in example.robots():
-            expected = example.joints(geometry)
+            poses = mechanism.completed(geometry, example.poses)
+            expected = example.joints(geometry, poses)
             normal, to_normal = mechanism.normalize_frames(geometry)
-            found = example.joints(normal, to_normal.poses(example.poses))
+            found = example.joints(normal, to_normal.poses(poses))
             np.testing.assert_allclose(found, expected, atol=ROUNDING, err_msg="in the convention's frames")
             for change in example.changes_of_frames():
                 changed = mechanism.change_frames(geometry, change)
-                found = example.joints(changed, change.poses(example.poses))
+                found = example.joints(changed, change.poses(poses))
                 np.testing.assert_allclose(found, expected, atol=ROUNDING, err_msg=str(change))
                 back = mechanism.change_frames(changed, change.inverse())
                 np.testing.assert_allclose(back.vector, geometry.vector, atol=ROUNDING)
@@ -104,7 +106,7 @@ class FrameTests:
             controller=CommandingGeometry.of(example.mechanism, example.drawing),
             branch=example.branch,
             prior=Prior.of(example.mechanism, example.drawing, example.widths),
-            noise=NOISE,
+            noise=replace(NOISE, joint_count=example.mechanism.joint_count),
         ).problem(records_without_noise(example, truth))
         found = identify(problem)
         # How large a machine is, records without noise seem to show, and sigma says that they do not.

@@ -37,7 +37,7 @@ class KinematicsTests:
         for geometry, poses, joints in example.robots_in_reach():
             residual = mechanism.residual_and_jacobian(geometry, poses, joints)[0]
             np.testing.assert_allclose(residual, 0.0, atol=ROUNDING, err_msg="the inverse leaves legs open")
-            sides = np.array(example.branch or (1,) * 6)
+            sides = np.array(example.branch or (1,) * mechanism.joint_count)
             found = mechanism.branch(geometry, poses, joints)
             expected = np.broadcast_to(sides, found.shape)
             np.testing.assert_array_equal(found, expected, "branch of the inverse")
@@ -46,11 +46,11 @@ class KinematicsTests:
             mechanism.inverse(example.drawing, example.branch, far)
 
     def test_constraints_are_lengths(self) -> None:
-        """A constraint is a leg's error in mm: where it closes, a motion along the leg counts fully."""
+        """A leg's constraint is its error in mm: where it closes, a motion along the leg counts fully."""
         example = self.example
         joints = example.joints(example.drawing)
         pose = example.mechanism.derivatives(example.drawing, example.poses, joints).pose
-        size = np.linalg.norm(pose[..., :3], axis=-1)
+        size = np.linalg.norm(pose[:, : example.mechanism.joint_count, :3], axis=-1)
         np.testing.assert_allclose(size, 1.0, atol=ROUNDING, err_msg="derivatives by the ball's position")
 
     def test_derivatives_are_those_of_the_constraints(self) -> None:
@@ -66,9 +66,9 @@ class KinematicsTests:
         mechanism = example.mechanism
         for geometry, poses, joints in example.robots_in_reach():
             zeros = mechanism.encoder_zeros(geometry)
-            for leg in range(6):
+            for leg, one in enumerate(np.eye(mechanism.joint_count)):
                 changed = Geometry(mechanism.parameters, geometry.vector + zeros[:, leg])
-                left = mechanism.residual_and_jacobian(changed, poses, joints - np.eye(6)[leg])[0]
+                left = mechanism.residual_and_jacobian(changed, poses, joints - one)[0]
                 words = f"encoder zero of leg {leg + 1}"
                 np.testing.assert_allclose(left, 0.0, atol=ROUNDING, err_msg=words)
 
@@ -143,11 +143,14 @@ def _check_derivatives_at(
 
     sizes = np.array([STEPS[parameter.kind.unit] for parameter in parameters.parameters])
     _compare(found.pose, by_twist, TWIST_STEPS, [f"pose {column}" for column in range(1, 7)])
-    of_each_joint = found.joints[..., None] * np.eye(6)
-    _compare(of_each_joint, by_joints, np.full(6, JOINT_STEPS[mechanism.words.joint_unit]), ["joints"] * 6)
-    # Leg i depends on its own numbers alone.
-    of_legs = found.parameters[:, :, None, :] * np.eye(6)[..., None]
-    of_all = of_legs.reshape(*found.joints.shape, len(parameters))[..., parameters.leg_order]
+    legs = mechanism.joint_count
+    of_each_joint = np.zeros((len(poses), 6, legs))
+    of_each_joint[:, np.arange(legs), np.arange(legs)] = found.joints
+    steps = np.full(legs, JOINT_STEPS[mechanism.words.joint_unit])
+    _compare(of_each_joint, by_joints, steps, ["joints"] * legs)
+    # A constraint depends on its own numbers alone.
+    of_own = parameters.by_constraint(np.eye(len(parameters)))
+    of_all = np.einsum("nic,icp->nip", found.parameters, of_own)
     _compare(of_all, by_parameters, sizes, parameters.names)
 
 

@@ -2,7 +2,7 @@
 
 Lost motion shows in the difference between records at which a joint arrived from either side. As poses
 come, joints that act alike arrive alike, and their coefficients are hard to tell apart. Over a waypoint at
-which each joint stands short of its place, or beyond it, any of the 64 combinations of sides is possible.
+which each joint stands short of its place, or beyond it, any combination of sides is possible.
 """
 
 from itertools import product
@@ -14,13 +14,10 @@ from hexacell.design.criteria import D_OPTIMAL, Criterion
 from hexacell.design.pose_selection import SelectedPose
 from hexacell.design.predicted_records import GaugeZero, predict_records
 from hexacell.design.travel_monte_carlo import TravelConstraint
-from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.motion.overshoot import clear_waypoint_before
 from hexacell.motion.paths import PathPlanner
-
-SIDES = np.array(list(product((1.0, -1.0), repeat=LEGS)))
 
 WORTH_A_MOVE = 1.05
 """How much more than straight a record must gain over a waypoint, which takes a move more: so about half
@@ -47,7 +44,8 @@ def with_best_sides(
     if not back or belief.terms is None or not any(one.needs_directions for one in belief.terms.terms):
         return selected
     covariance = belief.joint_covariance if known_then is None else known_then
-    records = predict_records(belief, zero, straight.targets[np.zeros(len(SIDES), dtype=np.intp)], SIDES)
+    sides = np.array(list(product((1.0, -1.0), repeat=belief.mechanism.joint_count)))
+    records = predict_records(belief, zero, straight.targets[np.zeros(len(sides), dtype=np.intp)], sides)
     gains = criterion.gain(covariance, records.jacobian, records.covariance)
     least = WORTH_A_MOVE * criterion.gain(covariance, straight.jacobian, straight.covariance)[0]
     start = PoseBatch.of(selected.waypoints[-1:]) if selected.waypoints else planner.start
@@ -55,7 +53,7 @@ def with_best_sides(
     for row in np.argsort(-gains)[:MOST_TRIED]:
         if gains[row] < least:
             break
-        waypoint = clear_waypoint_before(belief, start, stop, back * SIDES[row], zero.reference)
+        waypoint = clear_waypoint_before(belief, start, stop, back * sides[row], zero.reference)
         if waypoint is None:
             continue
         there, _ = outcomes_of(belief, waypoint)

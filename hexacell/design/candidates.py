@@ -92,7 +92,11 @@ def rows_apart(rotations: Array, ranking: NDArray[np.intp], most: int, apart: fl
 
 
 def targets_within_limits(belief: RobotBelief, poses: PoseBatch) -> ReachableTargets:
-    """The poses that the estimated robot takes within its limits, next to a singularity too."""
+    """The poses that the estimated robot takes within its limits, next to a singularity too.
+
+    Of a robot that lacks some freedoms those that it has instead, at the same places.
+    """
+    poses = belief.mechanism.completed(belief.estimate, poses)
     joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
     rows = np.flatnonzero(belief.keeps_limits(poses, joints))
     return ReachableTargets(poses[rows], joints[rows])

@@ -45,7 +45,8 @@ def select_validation_poses(
     Raises:
         LimitError: too few of them do.
     """
-    every = PoseBatch.at(point, belief.limits.orientations(np.concatenate([np.eye(3)[None], turns])))
+    drawn = PoseBatch.at(point, belief.limits.orientations(np.concatenate([np.eye(3)[None], turns])))
+    every = belief.mechanism.completed(belief.estimate, drawn)
     limits = belief.limits
     allowed = limits.allow_commands(every) & limits.allow_joints(belief.commanded.joints(every))
     poses = reachable_targets(belief, every[allowed]).poses

@@ -23,6 +23,7 @@ from hexacell.campaign.time_model import (
 from hexacell.checks.quick_level import QuickAccuracy, QuickLevel
 from hexacell.dry_run.verdict_forecast import VerdictForecast, predicted_held_out_sets, predicted_verdicts
 from hexacell.errors import HexacellError, ReachError
+from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record
@@ -201,6 +202,7 @@ class DryRunResult:
         expanded_mm: U of the largest error at the task poses, systematic effects included; None without.
         verdicts: the verdicts on healthy machines; None without task poses or held-out poses.
         visited: the poses of the first of these robots, in their order, with point and orientation.
+        undetermined: names of the parameters that these leave to the tolerances, by the first of them.
         course: had that run been ended earlier, its minutes and U (the error where U is not known), mm.
     """
 
@@ -215,6 +217,7 @@ class DryRunResult:
     verdicts: VerdictForecast | None = None
     visited: tuple[VisitedPose, ...] = ()
     course: tuple[tuple[float, float], ...] = ()
+    undetermined: tuple[str, ...] = ()
 
     @property
     def minutes(self) -> float:
@@ -244,6 +247,7 @@ class _Outcome:
     budget: UncertaintyBudget | None
     verdicts: VerdictForecast | None
     beside: Seconds
+    undetermined: tuple[str, ...]
 
 
 def _carry_out(plan: Plan, truth: Geometry, number: int, overheads: Overheads) -> _Outcome | None:
@@ -268,7 +272,15 @@ def _carry_out(plan: Plan, truth: Geometry, number: int, overheads: Overheads) -
     sets, times = predicted_held_out_sets(plan, found), TimeModel.of(plan.settings, overheads)
     verdicts = predicted_verdicts(plan, found, budget, sets)
     times = times.between_held_out(plan.robot, sets) if sets else times
-    return _Outcome(campaign, forecast, budget, verdicts, seconds_beside(plan.settings, times))
+    return _Outcome(
+        campaign, forecast, budget, verdicts, seconds_beside(plan.settings, times), _names(found)
+    )
+
+
+def _names(found: Identification) -> tuple[str, ...]:
+    """What an identification leaves to the tolerances, as people name it."""
+    convention = found.problem.mechanism.convention
+    return tuple(convention.display_name(name) for name in found.undetermined)
 
 
 def _summary(tried: int, identified: list[_Outcome]) -> DryRunResult:
@@ -296,6 +308,7 @@ def _summary(tried: int, identified: list[_Outcome]) -> DryRunResult:
         verdicts=VerdictForecast.mean(verdicts) if verdicts else None,
         visited=tuple((one.point, one.orientation, one.pose) for one in first.measurements.records),
         course=tuple((minutes + rest, error) for minutes, error in first.course),
+        undetermined=identified[0].undetermined,
     )
 
 

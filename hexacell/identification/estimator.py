@@ -21,7 +21,6 @@ from hexacell.identification.solver import fit
 from hexacell.identification.solver.result import GaugeFaultError, Identification
 from hexacell.identification.terms.term import Finding, ModelTerm, TermFinding
 from hexacell.kinematics import rotations
-from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
 
 SAME_AXIS_RATIO = 0.02
@@ -64,7 +63,11 @@ def _without_faults(problem: Problem) -> tuple[Selection, tuple[TermFinding, ...
     if problem.terms is not None:  # known before: linearized once more where the robot is
         known = (TermFinding(term.name, Finding.KNOWN, 0.0) for term in problem.terms.terms)
         return select_faults(with_terms_of(problem, fit.fit_regularized(problem))), tuple(known)
-    unknowns = len(problem.prior.covariance) + LEGS * len(problem.offered) + LEAST_SPARE_EQUATIONS
+    unknowns = (
+        len(problem.prior.covariance)
+        + problem.joints.shape[1] * len(problem.offered)
+        + LEAST_SPARE_EQUATIONS
+    )
     if not problem.offered or problem.equations < unknowns:
         return select_faults(problem), ()
     quick = fit.fit_regularized(problem, fit.QUICK)
@@ -134,7 +137,7 @@ def _require_enough_records(problem: Problem) -> None:
 
 
 def _require_rotation_diversity(problem: Problem) -> None:
-    """Require that the orientations at the points differ by rotations about more than one axis.
+    """Require that the orientations at the points differ by rotations about several axes, if they can.
 
     The principal axes are the eigenvectors of the rotation vectors' second moment.
 
@@ -151,7 +154,8 @@ def _require_rotation_diversity(problem: Problem) -> None:
             "the platform has one orientation in all records of a point",
             action="Measure each point in orientations tilted about x and about y, and turned about z",
         )
-    if squares[-2] < SAME_AXIS_RATIO**2 * squares[-1]:
+    can_tilt = {"a", "b"} & {*problem.mechanism.coordinates}
+    if can_tilt and squares[-2] < SAME_AXIS_RATIO**2 * squares[-1]:
         axis, missing = _axis_and_missing(axes[:, -1])
         raise IdentifiabilityError(
             f"all orientations turn about {axis} only, and so they cannot determine all parameters",

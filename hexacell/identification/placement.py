@@ -13,7 +13,7 @@ from hexacell.kinematics.rotations import Array
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """A robot at n poses, with the joint variables (n, 6), mm, that close its geometry there."""
+    """A robot at n poses, with the joint variables (n, J), mm, that close its geometry there."""
 
     mechanism: Mechanism
     geometry: Geometry
@@ -22,6 +22,11 @@ class Placement:
 
     def __len__(self) -> int:
         return len(self.poses)
+
+    @property
+    def each_leg(self) -> Array:
+        """One unit of each of the legs (J, J)."""
+        return np.eye(self.joints.shape[1])
 
     @cached_property
     def derivatives(self) -> ConstraintDerivatives:
@@ -39,11 +44,15 @@ class Placement:
         return np.asarray(-np.linalg.inv(self.derivatives.pose))
 
     def by_joints(self, errors: Array) -> Array:
-        """Errors of the poses (n, 6, k) by errors (n, 6, k), mm, of the joint variables."""
-        return np.asarray(self.by_constraints @ (self.derivatives.joints[..., None] * errors))
+        """Errors of the poses (n, 6, k) by errors (n, J, k), mm, of the joint variables."""
+        return self.by_legs(self.derivatives.joints[..., None] * errors)
+
+    def by_legs(self, errors: Array) -> Array:
+        """Errors of the poses (n, 6, k) by errors (n, J, k), mm, of the legs' constraints."""
+        return np.asarray(self.by_constraints[..., : errors.shape[1]] @ errors)
 
     def as_joints(self, errors: Array) -> Array:
-        """Changes of the joint variables (n, 6) that do what errors (n, 6), mm, of the constraints do.
+        """Changes of the joint variables (n, J) that do what errors (n, J), mm, of the legs do.
 
         A leg at its dead point has none.
         """
@@ -53,11 +62,8 @@ class Placement:
 
     def by_parameters(self, changes: Array) -> Array:
         """Errors of the poses (n, 6, k) by changes (P, k) of the parameters."""
-        parameters = self.mechanism.parameters
-        of_legs = np.empty_like(changes)
-        of_legs[parameters.leg_order] = changes
-        by_leg = of_legs.reshape(6, parameters.numbers_per_leg, -1)
-        errors = np.einsum("nic,ick->nik", self.derivatives.parameters, by_leg)
+        of_each = self.mechanism.parameters.by_constraint(changes)
+        errors = np.einsum("nic,ick->nik", self.derivatives.parameters, of_each)
         return np.asarray(self.by_constraints @ errors)
 
 
@@ -68,7 +74,7 @@ class RecordPlacement(Placement):
     Attributes:
         deviations: (n, 3), mm, along the base axes.
         gauges: (3, 3), columns: measuring directions of the gauges.
-        directions: (n, 6) from which side each joint arrived, 1 or -1; 0 where that is not known.
+        directions: (n, J) from which side each joint arrived, 1 or -1; 0 where that is not known.
         warmer: (n, 7), K, legs and base than the geometry's; what that does is not in the joint variables.
     """
 
@@ -94,7 +100,7 @@ class Weight:
 
 
 def leg_forces(placement: Placement, weight: Weight) -> Array:
-    """Forces (n, 6) of the legs, N, by a weight of one newton on the platform; tension is positive."""
+    """Forces (n, J) of the legs, N, by a weight of one newton on the platform; tension is positive."""
     poses = placement.poses
     direction, arms = weight.direction, poses.rotations @ weight.beside_mm
     if weight.centre_mm is None:
@@ -104,4 +110,5 @@ def leg_forces(placement: Placement, weight: Weight) -> Array:
         arms = arms + poses.rotations @ weight.centre_mm
     wrench = np.concatenate([np.broadcast_to(direction, arms.shape), np.cross(arms, direction)], axis=-1)
     # Virtual work: J^T t = w, with -J^-1 at hand.
-    return np.asarray(-np.einsum("nji,nj->ni", placement.by_constraints, wrench))
+    by_legs = placement.by_constraints[..., : placement.joints.shape[1]]
+    return np.asarray(-np.einsum("nji,nj->ni", by_legs, wrench))

@@ -13,12 +13,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexacell.identification.placement import Placement
-from hexacell.kinematics.parameters import LEGS, MachinePart
+from hexacell.kinematics.parameters import MachinePart
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MEASURED_PARTS, MeasurementSet, Temperatures, temperatures_of
 
 UM_PER_M = 1e-6
 """A relative expansion."""
+
+BASE = MEASURED_PARTS - 1
+"""The last of the temperatures; those of legs that a machine does not have are not known."""
 
 MOST_GAPS = 0.1
 """Share of the records at which a thermometer may be silent: between others it is known well enough."""
@@ -71,24 +74,24 @@ class ThermalExpansion:
         """The joint variables (n, 6) that parts not ``warmer`` (n, 7), K, would have at the same poses."""
         if not warmer.any():
             return at.joints
-        longer = self.legs_um_m_k * warmer[:, :LEGS] - self.base_um_m_k * warmer[:, LEGS:]
+        legs = at.joints.shape[1]
+        longer = self.legs_um_m_k * warmer[:, :legs] - self.base_um_m_k * warmer[:, BASE:]
         return np.asarray(at.joints + at.as_joints(longer_legs(at, longer)))
 
 
 def longer_legs(at: Placement, um_per_m: float | Array) -> Array:
-    """Errors (n, 6), mm, of the constraints by legs that are longer by some shares (n, 6)."""
+    """Errors (n, J), mm, of the legs' constraints by legs that are longer by some shares (n, J)."""
     parameters = at.mechanism.parameters
     expands = {kind.symbol: float(kind.part is MachinePart.LEGS) for kind in parameters.kinds}
-    lengths = np.empty(len(parameters))
-    lengths[parameters.leg_order] = parameters.by_kind(expands) * at.geometry.vector
-    by_leg = np.einsum("nic,ic->ni", at.derivatives.parameters, lengths.reshape(LEGS, -1))
+    lengths = parameters.by_constraint(parameters.by_kind(expands) * at.geometry.vector)
+    by_leg = np.einsum("nic,ic->ni", at.derivatives.parameters, lengths)[:, : at.joints.shape[1]]
     return np.asarray(UM_PER_M * um_per_m * by_leg)
 
 
-def known_parts(rows: Iterable[Temperatures]) -> frozenset[MachinePart]:
+def known_parts(rows: Iterable[Temperatures], legs: int) -> frozenset[MachinePart]:
     """The parts, of all legs and the base beside them, whose temperature (nearly) all of n records have."""
     unknown = np.isnan(temperatures_of(rows))
     is_known = unknown.mean(axis=0) <= MOST_GAPS if len(unknown) else np.zeros(MEASURED_PARTS, dtype=bool)
-    if not is_known[:LEGS].all():
+    if not is_known[:legs].all():
         return frozenset()
-    return frozenset({MachinePart.LEGS, *([MachinePart.BASE] if is_known[LEGS] else [])})
+    return frozenset({MachinePart.LEGS, *([MachinePart.BASE] if is_known[BASE] else [])})

@@ -12,7 +12,9 @@ from typing import NamedTuple
 
 from hexacell.kinematics.parameters import JointUnit, ParameterUnit
 
-Six = tuple[float, float, float, float, float, float]
+Six = tuple[float, ...]
+"""A number for each joint."""
+
 Three = tuple[float, float, float]
 
 NONE: Six = (0.0,) * 6

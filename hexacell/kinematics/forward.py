@@ -72,7 +72,7 @@ def assembly_mode(pose_jacobian: Array) -> Array:
 
 
 def modes_of(mechanism: Mechanism, geometry: Geometries, poses: PoseBatch, joints: Array) -> Array:
-    """:func:`assembly_mode` (n,) of n poses at joint variables (n, 6); one geometry, or one for each."""
+    """:func:`assembly_mode` (n,) of n poses at joint variables (n, J); one geometry, or one for each."""
     return assembly_mode(mechanism.residual_and_jacobian(geometry, poses, joints)[1])
 
 
@@ -113,7 +113,7 @@ def forward_kinematics(
 ) -> ForwardResult:
     """Poses of n joint vectors by damped Newton's method; a pose that has converged is not changed further.
 
-    ``joints`` (n, 6) are in their unit, and ``start`` are n nearby poses, whose assembly ``mode`` (n,) is
+    ``joints`` (n, J) are in their unit, and ``start`` are n nearby poses, whose assembly ``mode`` (n,) is
     required by default. No constraint of a solution is larger than ``tolerance_mm``. Poses of which a step
     is more than the ``largest_contraction`` of the one before are not found; with less than 1, nor those
     whose first step is too large.
@@ -162,9 +162,9 @@ def continue_solution(
     start_joints: Array | None = None,
     stage_counts: Sequence[int] = CONTINUATION_STAGES,
 ) -> ForwardResult:
-    """Poses of n joint vectors (n, 6), in their unit, by continuation from n known poses.
+    """Poses of n joint vectors (n, J), in their unit, by continuation from n known poses.
 
-    Those close ``start_geometry`` at ``start_joints`` (n, 6): by default ``joints``, so that only the
+    Those close ``start_geometry`` at ``start_joints`` (n, J): by default ``joints``, so that only the
     geometry changes. The next of the ``stage_counts`` is tried for the poses where one fails.
     """
     if start_joints is None:
@@ -199,7 +199,7 @@ def _continue_in_stages(
     start: PoseBatch,
     stages: int,
 ) -> ForwardResult:
-    """Continuation from the first to the second of two geometries and joint vectors (n, 6), mm."""
+    """Continuation from the first to the second of two geometries and joint vectors (n, J), mm."""
     poses = start
     rows = np.arange(len(start))
     mode = modes_of(mechanism, geometries[0], start, joints[0])

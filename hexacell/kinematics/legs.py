@@ -5,15 +5,14 @@ Letters 21, 1985).
 """
 
 from dataclasses import dataclass
+from functools import cache
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hexacell.errors import UsageError
 from hexacell.kinematics.rotations import Array, Mask
-
-PAIRS = np.array(list(combinations(range(6), 2)))
-"""Pairs of legs, counted from 0."""
 
 BLOCK = 128
 """Poses computed at once: larger arrays get fresh memory from the system each time, which takes longer."""
@@ -30,10 +29,10 @@ class Legs:
     """The legs at n poses, in the base frame.
 
     Attributes:
-        base_joints: (n, 6, 3) passive joints at the base's end: those on the sliders or cranks, mm.
-        platform_joints: (n, 6, 3), mm.
+        base_joints: (n, J, 3) passive joints at the base's end: those on the sliders or cranks, mm.
+        platform_joints: (n, J, 3), mm.
         rotations: (n, 3, 3) platform frame to base frame.
-        carriers: (n, 6, 3, 3) to the base frame from what carries each leg's joint at the base's end; None
+        carriers: (n, J, 3, 3) to the base frame from what carries each leg's joint at the base's end; None
             where that does not turn.
     """
 
@@ -48,12 +47,12 @@ class Legs:
 
     @property
     def directions(self) -> Array:
-        """Unit vectors (n, 6, 3) from the platform to the base, in the base frame."""
+        """Unit vectors (n, J, 3) from the platform to the base, in the base frame."""
         vectors = self.base_joints - self.platform_joints
         return vectors / np.sqrt(_dot(vectors, vectors))[..., None]
 
     def in_carriers(self, directions: Array) -> Array:
-        """Vectors (n, 6, 3) of the legs in the frames of what carries their joints on the base."""
+        """Vectors (n, J, 3) of the legs in the frames of what carries their joints on the base."""
         if self.carriers is None:
             return directions
         return np.asarray(np.einsum("nlij,nli->nlj", self.carriers, directions))
@@ -63,13 +62,19 @@ class Legs:
         # Coordinates come first: sums over three numbers at the end of an array take several times as long.
         start = np.ascontiguousarray(self.base_joints.T)
         end = np.ascontiguousarray(self.platform_joints.T)
-        first, second = PAIRS.T
+        first, second = _pairs(start.shape[1])
         smallest = np.empty(len(self.base_joints))
         for row in range(0, len(smallest), BLOCK):
             some = np.s_[..., row : row + BLOCK]
             ends = (one[some][:, legs] for legs in (first, second) for one in (start, end))
             smallest[some] = segment_distances(*ends).min(axis=0)
         return smallest
+
+
+@cache
+def _pairs(legs: int) -> NDArray[np.intp]:
+    """Pairs (2, k) of legs, counted from 0."""
+    return np.array(list(combinations(range(legs), 2))).T
 
 
 def segment_distances(start: Array, end: Array, other_start: Array, other_end: Array) -> Array:
@@ -108,11 +113,11 @@ def _dot(one: Array, other: Array) -> Array:
 
 
 def by_pose(b: Array, n: Array) -> Array:
-    """Derivatives ``[n, b x n]`` (n, 6, 6) of the legs' lengths by position, then rotation vector.
+    """Derivatives ``[n, b x n]`` (n, J, 6) of the legs' lengths by position, then rotation vector.
 
     Args:
-        b: (n, 6, 3) from the ball to the platform joints, in the base frame, mm.
-        n: (n, 6, 3) direction of each leg towards the platform, of length 1 where the leg closes.
+        b: (n, J, 3) from the ball to the platform joints, in the base frame, mm.
+        n: (n, J, 3) direction of each leg towards the platform, of length 1 where the leg closes.
     """
     jacobian = np.empty((*n.shape[:-1], 6))
     jacobian[..., :3] = n

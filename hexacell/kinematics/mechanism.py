@@ -1,4 +1,10 @@
-"""The interface of a mechanism: one constraint per leg, its derivatives, and its frames."""
+"""The interface of a mechanism: six constraints, their derivatives, and its frames.
+
+A constraint is that of a leg with a joint variable. Where there are fewer than six of these, passive joints
+hold the platform in what is missing, and the last constraints, which have no joint variable, are theirs.
+The robot then has as many coordinates as joints. The other angles of its poses follow from the passive
+constraints (:meth:`Mechanism.completed`).
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,11 +17,11 @@ from hexacell.errors import ReachError
 from hexacell.kinematics.geometry import Geometries, Geometry
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.parameters import GeometricParameter, JointUnit, ParameterSet
-from hexacell.kinematics.pose import FrameTransform, PoseBatch
+from hexacell.kinematics.pose import AXES, FrameTransform, Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 
 Sign = Literal[1, -1]
-Branch = tuple[Sign, Sign, Sign, Sign, Sign, Sign] | tuple[()]
+Branch = tuple[Sign, ...]
 """Which of its two inverse solutions each leg is on; empty where a leg has only one."""
 
 STEP = 1e-4
@@ -29,8 +35,9 @@ class ConstraintDerivatives:
     Attributes:
         pose: (n, 6, 6) by the ball's position, mm, then by a rotation vector in the base frame,
             rad, applied from the left.
-        joints: (n, 6): leg i depends on joint variable i alone, in its unit.
-        parameters: (n, 6, c): leg i depends on its own c numbers alone, in the order of the kinds.
+        joints: (n, J): leg i depends on joint variable i alone, in its unit.
+        parameters: (n, 6, c): a constraint depends on its own numbers alone, in the order of the kinds; 0
+            where it has fewer than c.
     """
 
     pose: Array
@@ -75,10 +82,11 @@ class FrameConvention:
         return self.parameters.rows(self.free_names)
 
     @cached_property
-    def dependent(self) -> tuple[tuple[int, int], ...]:
-        """Parameters that are equal to another one, and the free parameter that stands for both."""
-        rows = self.parameters.rows([name for group in self.equal for name in group[1:]])
-        return tuple(zip(rows.tolist(), self.basis[rows].argmax(axis=1).tolist(), strict=True))
+    def further_places(self) -> tuple[tuple[int, int], ...]:
+        """Places of derivatives that are added to that of a free parameter, and which free parameter."""
+        taken = set(self.parameters.first_places[self.free_rows].tolist())
+        columns = [(place, np.flatnonzero(self.basis[row])) for row, place in self.parameters.places]
+        return tuple((place, int(one[0])) for place, one in columns if len(one) and place not in taken)
 
     def free_parameters(self, geometry: Geometry) -> Array:
         """The free parameters (p,) of a geometry in the convention's frames."""
@@ -136,8 +144,8 @@ class Guides:
 
     Attributes:
         rails: the legs, counted from 0, whose sliders share a rail.
-        along: (n, 6) position of each slider along its rail, mm.
-        across: (n, 6, 2) derivatives of the constraints by a displacement of the slider's joint across
+        along: (n, J) position of each slider along its rail, mm.
+        across: (n, J, 2) derivatives of the constraints by a displacement of the slider's joint across
             its rail, horizontally and vertically.
     """
 
@@ -155,19 +163,25 @@ class MechanismWords:
         joint: what each joint variable is the position of; text adds the leg, as in "slider 3".
         guide: what the joints move along, with errors of its own; None where there is no such thing.
         joint_unit: of the joint variables, which are places of what slides or angles of what turns.
+        never_seen: what no record shows although the machine has it, and what it does at work; empty where
+            only frames are not seen.
     """
 
     machine: str
     joint: str
     guide: str | None = None
     joint_unit: JointUnit = JointUnit.MM
+    never_seen: str = ""
 
 
 class Mechanism(Protocol):
-    """A six-legged parallel mechanism; all methods are batched over n poses, and do not raise.
+    """A parallel mechanism with J driven legs; all methods are batched over n poses, and do not raise.
 
     A ``geometry`` is one for all poses, or one for each where a batch is allowed; ``poses`` are n poses,
-    and ``joints`` (n, 6) joint variables in the unit of the mechanism.
+    and ``joints`` (n, J) joint variables in the unit of the mechanism.
+
+    Attributes:
+        coordinates: those of a pose that the robot has, as many as joints, of ``xyzabc``.
     """
 
     name: str
@@ -175,28 +189,38 @@ class Mechanism(Protocol):
     parameters: ParameterSet
     convention: FrameConvention
     frame_freedom: FrameFreedom
+    coordinates: str = AXES
+
+    @property
+    def joint_count(self) -> int:
+        """J, the number of joints that are driven, each with an encoder."""
+        return len(self.coordinates)
+
+    def completed(self, geometry: Geometry, poses: PoseBatch) -> PoseBatch:  # noqa: ARG002 - all are free here
+        """The poses (n) with those angles that the robot does not have as its passive joints make them."""
+        return poses
 
     def residual_and_jacobian(
         self, geometry: Geometries, poses: PoseBatch, joints: Array
     ) -> tuple[Array, Array]:
         """The constraints of the legs and their derivatives by the pose, for Newton's method.
 
-        The length errors of the legs (n, 6), mm, are zero where they close; their derivatives (n, 6, 6) are
-        by the ball's position, mm, and the rotation vector, rad.
+        The errors (n, 6), mm, are zero where all legs close; their derivatives (n, 6, 6) are by the ball's
+        position, mm, and the rotation vector, rad.
         """
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
         """All derivatives of the constraints, off closed poses as well."""
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
-        """The inverse kinematics in closed form: joint variables (n, 6); NaN out of a leg's reach.
+        """The inverse kinematics in closed form: joint variables (n, J); NaN out of a leg's reach.
 
         ``branch`` is that of each leg; empty for a mechanism without (:attr:`ParameterSet.has_branch
         <hexacell.kinematics.parameters.ParameterSet.has_branch>`).
         """
 
     def branch(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
-        """The inverse solution that each leg is on (n, 6): -1 or 1; 1 where it has only one."""
+        """The inverse solution that each leg is on (n, J): -1 or 1; 1 where it has only one."""
 
     def normalize_frames(self, geometry: Geometry) -> tuple[Geometry, FrameTransform]:
         """The machine in the frames of :attr:`convention`, and the change of frames."""
@@ -205,7 +229,7 @@ class Mechanism(Protocol):
         """The machine in other frames."""
 
     def encoder_zeros(self, geometry: Geometry) -> Array:
-        """Changes (P, 6) of the parameters that an encoder does too, which shows 1 less on each leg.
+        """Changes (P, J) of the parameters that an encoder does too, which shows 1 less on each leg.
 
         They are in the unit of the joint variables: with the change of a leg and 1 less on its encoder the
         legs close as before, at all poses.
@@ -221,8 +245,24 @@ class Mechanism(Protocol):
         """Mean distance of the platform joints from the ball, mm; (n,) for a batch. It scales rotations."""
 
 
+def with_coordinates(mechanism: Mechanism) -> Mechanism:
+    """A mechanism, with all six coordinates where its package says nothing of them, as older ones do."""
+    if not hasattr(mechanism, "completed"):
+        vars(mechanism).update(
+            coordinates=AXES, joint_count=len(AXES), completed=lambda _geometry, poses: poses
+        )
+    return mechanism
+
+
+def completed_pose(mechanism: Mechanism, geometry: Geometry, pose: Pose) -> Pose:
+    """A pose with those angles that the robot does not have as its passive joints make them."""
+    if mechanism.joint_count == len(AXES):
+        return pose
+    return mechanism.completed(geometry, PoseBatch.of([pose])).pose(0)
+
+
 def joint_zeros(mechanism: Mechanism, geometry: Geometry) -> Array:
-    """The encoders' zeros (6,) that a geometry in any frames contains, in the unit of the joint variables.
+    """The encoders' zeros (J,) that a geometry in any frames contains, in the unit of the joint variables.
 
     A joint variable and the zero together are what does not depend on the encoder: the whole length of a
     Gough-Stewart platform's leg, the place of a slider in the base frame.
@@ -231,7 +271,7 @@ def joint_zeros(mechanism: Mechanism, geometry: Geometry) -> Array:
 
 
 def inverse_kinematics(mechanism: Mechanism, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
-    """The joint variables (n, 6) of n poses that are all within reach, in their unit.
+    """The joint variables (n, J) of n poses that are all within reach, in their unit.
 
     Raises:
         ReachError: a pose is out of a leg's reach; the message names both.

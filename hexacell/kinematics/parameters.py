@@ -1,10 +1,10 @@
-"""The geometric parameters of a six-legged mechanism: kinds, names, units, order.
+"""The geometric parameters of a mechanism: kinds, names, units, order.
 
 A mechanism describes its parameters once, as a :class:`ParameterSet`. Vectors, documents, tables, the
 prior and the frame convention are derived from that description.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -15,7 +15,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from hexacell.kinematics.rotations import Array
 
-LEGS = 6
+CONSTRAINTS = 6
+"""Of every mechanism: as many as a pose has coordinates."""
+
+LEGS = CONSTRAINTS
+"""Of a mechanism whose constraints are all those of driven legs."""
+
+Owners = tuple[tuple[int, ...], ...]
+"""For each row of a kind the constraints, counted from 0, that depend on it."""
+
+
+def each_of(legs: int) -> Owners:
+    """A row for each leg, on which that leg alone depends."""
+    return tuple((leg,) for leg in range(legs))
+
+
+OF_SIX = each_of(CONSTRAINTS)
 
 
 class ParameterUnit(StrEnum):
@@ -67,7 +82,7 @@ class MachinePart(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class ParameterKind:
-    """One quantity that every leg has, such as the joint on its slider.
+    """One quantity that every leg has, such as the joint on its slider, or that some of them share.
 
     Attributes:
         symbol: as in formulas and files: ``S``.
@@ -79,6 +94,7 @@ class ParameterKind:
         is_positive: only values above zero are physical.
         default_tolerance: where the cell file states none; without one it must.
         default: its value where a drawing states none; without one it must.
+        owners: the legs that depend on each row of it; constraints of passive joints follow the legs.
         part: the part that expands with the temperature, and this kind with it; None if it does not.
 
     Raises:
@@ -96,22 +112,29 @@ class ParameterKind:
     default_tolerance: float | None = None
     part: MachinePart | None = None
     default: float | None = None
+    owners: Owners = OF_SIX
 
     def __post_init__(self) -> None:
         if self.default is not None and self.components:
             raise ValueError(f"{self.symbol} has a default, so it must be a single number a leg")
-        if self.has_ball_offset and self.components != ("x", "y", "z"):
+        if self.has_ball_offset and self.components not in {("x", "y", "z"), ("x", "y")}:
             raise ValueError(f"{self.symbol} takes the ball's offset, so its components must be x, y, z")
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """``(6, c)``, or ``(6,)`` for a single number a leg."""
-        return (LEGS, len(self.components)) if self.components else (LEGS,)
+        """``(rows, c)``, or ``(rows,)`` for single numbers; a row is of a leg, unless some share it."""
+        rows = len(self.owners)
+        return (rows, len(self.components)) if self.components else (rows,)
 
     @property
-    def numbers_per_leg(self) -> int:
-        """How many numbers of this kind a leg has."""
+    def numbers_per_row(self) -> int:
+        """How many numbers a row has."""
         return max(1, len(self.components))
+
+    @property
+    def size(self) -> int:
+        """How many numbers there are of this kind."""
+        return len(self.owners) * self.numbers_per_row
 
     def display_name(self, leg: int, component: str, joints: str | None = None) -> str:
         """The name in text: "leg 3 length", "B6 x"; ``joints`` names several equal parameters."""
@@ -126,7 +149,7 @@ class ParameterKind:
 
 @dataclass(frozen=True, slots=True)
 class GeometricParameter:
-    """One number of the geometry; legs count from 1."""
+    """One number of the geometry; ``leg``, from 1, is its row of the kind."""
 
     kind: ParameterKind
     leg: int
@@ -140,7 +163,7 @@ class GeometricParameter:
 
 @dataclass(frozen=True)
 class ParameterSet:
-    """All parameters of a mechanism, in the order of its vectors: by kind, then leg, then component.
+    """All parameters of a mechanism, in the order of its vectors: by kind, then row, then component.
 
     ``has_branch``: a leg has two inverse solutions, and a config states beside the parameters which one.
     """
@@ -154,7 +177,7 @@ class ParameterSet:
         return tuple(
             GeometricParameter(kind, leg, component)
             for kind in self.kinds
-            for leg in range(1, LEGS + 1)
+            for leg in range(1, len(kind.owners) + 1)
             for component in (kind.components or ("",))
         )
 
@@ -174,7 +197,7 @@ class ParameterSet:
     @cached_property
     def slices(self) -> Mapping[str, slice]:
         """The part of a vector that belongs to each kind, by its symbol."""
-        ends = np.cumsum([LEGS * kind.numbers_per_leg for kind in self.kinds]).tolist()
+        ends = np.cumsum([kind.size for kind in self.kinds]).tolist()
         symbols = (kind.symbol for kind in self.kinds)
         return {
             symbol: slice(begin, end)
@@ -186,10 +209,15 @@ class ParameterSet:
         """The shape of each kind's values, by its symbol."""
         return {kind.symbol: kind.shape for kind in self.kinds}
 
+    @property
+    def legs(self) -> int:
+        """How many rows the kind with most of them has: one for each driven leg."""
+        return max(len(kind.owners) for kind in self.kinds)
+
     @cached_property
-    def numbers_per_leg(self) -> int:
-        """How many parameters a leg has."""
-        return sum(kind.numbers_per_leg for kind in self.kinds)
+    def columns(self) -> int:
+        """How many parameters the constraint has that depends on most of them."""
+        return max(sum(kind.numbers_per_row for kind in self._of(row)) for row in range(CONSTRAINTS))
 
     @cached_property
     def like_a_mm(self) -> Array:
@@ -197,22 +225,52 @@ class ParameterSet:
         return np.array([parameter.kind.unit.like_a_mm for parameter in self.parameters])
 
     @cached_property
-    def leg_order(self) -> NDArray[np.intp]:
-        """For each parameter its index among the numbers of leg 1, then those of leg 2, and so on.
+    def places(self) -> tuple[tuple[int, int], ...]:
+        """The parameters, and where each constraint that depends on one has its derivative.
 
-        The numbers of one leg are in the order of the kinds.
+        In all constraints' derivatives (6, c) as one row, each constraint's in the order of the kinds.
         """
-        of_legs = np.arange(LEGS * self.numbers_per_leg).reshape(LEGS, -1)
-        ends = np.cumsum([kind.numbers_per_leg for kind in self.kinds])[:-1]
-        return np.concatenate([part.ravel() for part in np.split(of_legs, ends, axis=1)])
+        found: list[tuple[int, int]] = []
+        for constraint in range(CONSTRAINTS):
+            place = constraint * self.columns
+            for kind in self._of(constraint):
+                row = next(n for n, owners in enumerate(kind.owners) if constraint in owners)
+                first = self.slices[kind.symbol].start + row * kind.numbers_per_row
+                found += [(first + number, place + number) for number in range(kind.numbers_per_row)]
+                place += kind.numbers_per_row
+        return tuple(sorted(found))
 
-    def of_every_leg(self, values: Array) -> Array:
-        """The vector in which every leg has the same numbers (c,), in the order of the kinds."""
-        return np.tile(values, LEGS)[self.leg_order]
+    @cached_property
+    def first_places(self) -> NDArray[np.intp]:
+        """For each parameter the first of its :attr:`places`."""
+        first = dict(reversed(self.places))
+        return np.array([first[row] for row in range(len(self))], dtype=np.intp)
+
+    @cached_property
+    def further_places(self) -> tuple[tuple[int, int], ...]:
+        """Parameters on which several constraints depend, each with its other places."""
+        return tuple((row, place) for row, place in self.places if place != self.first_places[row])
+
+    def by_constraint(self, changes: Array) -> Array:
+        """Changes (P, ...) of the parameters as those (6, c, ...) of what each constraint depends on."""
+        rows, places = np.array(self.places).T
+        found = np.zeros((CONSTRAINTS * self.columns, *changes.shape[1:]))
+        found[places] = changes[rows]
+        return found.reshape(CONSTRAINTS, self.columns, *changes.shape[1:])
+
+    def _of(self, constraint: int) -> Iterator[ParameterKind]:
+        """The kinds that a constraint depends on."""
+        return (kind for kind in self.kinds if any(constraint in owners for owners in kind.owners))
+
+    def of_every_row(self, values: Array) -> Array:
+        """The vector in which all rows of a kind have the same numbers: values (c,), kind by kind."""
+        ends = np.cumsum([kind.numbers_per_row for kind in self.kinds])[:-1]
+        parts = zip(self.kinds, np.split(values, ends), strict=True)
+        return np.concatenate([np.tile(part, len(kind.owners)) for kind, part in parts])
 
     def by_kind(self, values: Mapping[str, float]) -> Array:
         """The vector in which all parameters of a kind have the value under its symbol."""
-        counts = [LEGS * kind.numbers_per_leg for kind in self.kinds]
+        counts = [kind.size for kind in self.kinds]
         return np.repeat([values[kind.symbol] for kind in self.kinds], counts)
 
     @cached_property
@@ -225,11 +283,11 @@ class ParameterSet:
         )
 
     def array(self, vector: Array, symbol: str) -> Array:
-        """One kind's values ``(..., 6, c)`` or ``(..., 6)`` in vectors (..., P): a view."""
+        """One kind's values ``(..., rows, c)`` or ``(..., rows)`` in vectors (..., P): a view."""
         return vector[..., self.slices[symbol]].reshape(*vector.shape[:-1], *self.shapes[symbol])
 
     def changes(self, symbol: str, values: Array) -> Array:
-        """Changes (P, k) of all parameters by those (6, c, k) or (6, k) of one kind alone."""
+        """Changes (P, k) of all parameters by those (rows, c, k) or (rows, k) of one kind alone."""
         changes = np.zeros((len(self), values.shape[-1]))
         changes[self.slices[symbol]] = values.reshape(-1, values.shape[-1])
         return changes

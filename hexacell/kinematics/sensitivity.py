@@ -5,8 +5,9 @@ parameters p. By the implicit function theorem
 
     dx/dq = -J^-1 dc/dq,    dx/dp = -J^-1 dc/dp,    J = dc/dx.
 
-A free parameter stands for one parameter of a leg, or for several that a frame convention makes equal. Its
-derivative is the sum of theirs: most are one number of one leg, so that they are picked and few are added.
+A free parameter stands for one parameter of a constraint, or for several: those that a frame convention
+makes equal, and those that constraints share. Its derivative is the sum of theirs: most are one number of
+one leg, so that they are picked and few are added.
 
 The distance from a singularity is the smallest singular value s of J, with rotations scaled by the
 platform's mean radius. Whether s is at least m is decided without a singular value decomposition for most
@@ -21,7 +22,7 @@ With the Gramian ``M = A A^T``, ``||A||_2 = ||M^2||_2^(1/4)``, which gives the c
 Only poses between these bounds need the decomposition.
 
 In all functions a ``geometry`` is one for all of n ``poses``, or one for each where a batch is allowed, in
-the convention's frames; ``joints`` (n, 6) are the joint variables there, in their unit. ``coordinates`` is
+the convention's frames; ``joints`` (n, J) are the joint variables there, in their unit. ``coordinates`` is
 ``POSITION`` or ``POSE``, of which m derivatives follow, and a ``margin`` the least singular value,
 dimensionless.
 
@@ -45,7 +46,7 @@ POSE = 6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeSensitivity(Batch):
-    """Derivatives of a pose by the joint variables (n, m, 6) and the free parameters (n, m, p).
+    """Derivatives of a pose by the joint variables (n, m, J) and the free parameters (n, m, p).
 
     Rows are the ball's position, mm, then, if m is 6, the rotation vector in the base frame, rad.
     ``constraints`` (n, 6, 6) are the derivatives of the constraints by the pose.
@@ -106,13 +107,14 @@ def _by_inverse(
     """The sensitivity by the inverses (n, 6, 6) of the pose Jacobians."""
     by_constraints = -inverse[:, :coordinates]
     products = by_constraints[..., None] * linear.parameters[..., None, :, :]
-    legs_times_each = products.shape[2] * products.shape[3]  # of no pose numpy cannot infer it
-    of_legs = products.reshape(*products.shape[:2], legs_times_each)  # by the numbers of leg 1, 2, ...
-    order, convention = mechanism.parameters.leg_order, mechanism.convention
-    by_free: Array = np.take(of_legs, order[convention.free_rows], axis=-1)
-    for row, column in convention.dependent:
-        by_free[..., column] += of_legs[..., order[row]]
-    return FreeSensitivity(by_constraints * linear.joints[..., None, :], by_free, linear.pose)
+    all_places = products.shape[2] * products.shape[3]  # of no pose numpy cannot infer it
+    of_each = products.reshape(*products.shape[:2], all_places)
+    convention = mechanism.convention
+    by_free: Array = np.take(of_each, mechanism.parameters.first_places[convention.free_rows], axis=-1)
+    for place, column in convention.further_places:
+        by_free[..., column] += of_each[..., place]
+    by_legs = by_constraints[..., : linear.joints.shape[-1]]
+    return FreeSensitivity(by_legs * linear.joints[..., None, :], by_free, linear.pose)
 
 
 def singularity_margin(

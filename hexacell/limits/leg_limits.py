@@ -20,11 +20,11 @@ class LegLimits:
     """What passive joints and legs allow.
 
     Attributes:
-        base_axes: (6, 3) unit vectors about which the base's passive joints turn: in the base frame, or
+        base_axes: (J, 3) unit vectors about which the base's passive joints turn: in the base frame, or
             in that of the crank which carries the joint.
-        platform_axes: (6, 3) those of the platform's joints, in the platform frame.
-        base_cones: (6,) largest angles of the legs from these axes, rad.
-        platform_cones: (6,) those at the platform, rad.
+        platform_axes: (J, 3) those of the platform's joints, in the platform frame.
+        base_cones: (J,) largest angles of the legs from these axes, rad.
+        platform_cones: (J,) those at the platform, rad.
         distance_mm: smallest distance of two legs; 0 is no limit, and has no margin. Below it, where limits
             were widened, everything is allowed, with a margin.
     """
@@ -38,8 +38,8 @@ class LegLimits:
     def margins(self, legs: Legs) -> Array:
         """By how much n poses keep these limits, (n, m), negative beyond them.
 
-        The angles, rad, that the passive joints have left, six at the base and six at the platform, then
-        the legs' spare distance, mm, if it has a limit.
+        The angles, rad, that each leg's passive joints have left, at the base and at the platform, then the
+        legs' spare distance, mm, if it has a limit.
         """
         along = legs.directions
         at_base = self.base_cones - angles_between(legs.in_carriers(along), self.base_axes)
@@ -53,21 +53,22 @@ class LegLimits:
         Distances take most of the time, and the platform's joints limit most, so that each is computed only
         where those before it are kept.
         """
-        least = np.zeros(12 + (self.distance_mm != 0.0)) + wanted
+        count = len(self.base_cones)
+        least = np.zeros(2 * count + (self.distance_mm != 0.0)) + wanted
         directions = legs.directions
         at_platform = angles_between(directions @ legs.rotations, self.platform_axes)
-        kept = np.asarray((self.platform_cones - at_platform >= least[6:12]).all(axis=-1))
+        kept = np.asarray((self.platform_cones - at_platform >= least[count : 2 * count]).all(axis=-1))
         legs = legs[kept]
         at_base = angles_between(legs.in_carriers(directions[kept]), self.base_axes)
-        are_free = np.asarray((self.base_cones - at_base >= least[:6]).all(axis=-1))
+        are_free = np.asarray((self.base_cones - at_base >= least[:count]).all(axis=-1))
         if self.distance_mm != 0.0:
-            are_free[are_free] = legs[are_free].smallest_distance() - self.distance_mm >= least[12]
+            are_free[are_free] = legs[are_free].smallest_distance() - self.distance_mm >= least[-1]
         kept[kept] = are_free
         return kept
 
     def margins_for(self, turn: float, radius_mm: float) -> Array:
         """Margins (m,) that hold should a platform of some radius turn by an angle, rad."""
-        turns = np.full(12, turn)
+        turns = np.full(2 * len(self.base_cones), turn)
         return turns if self.distance_mm == 0.0 else np.append(turns, turn * radius_mm)
 
     def including(self, margins: Array, wanted: Array | float = 0.0) -> "LegLimits":
@@ -75,10 +76,11 @@ class LegLimits:
         missing = np.maximum(0.0, wanted - margins + ROUNDING)
         if not missing.any():
             return self
-        distance = self.distance_mm - float(missing[12:].sum())
+        count = len(self.base_cones)
+        distance = self.distance_mm - float(missing[2 * count :].sum())
         return replace(
             self,
-            base_cones=self.base_cones + missing[:6],
-            platform_cones=self.platform_cones + missing[6:12],
+            base_cones=self.base_cones + missing[:count],
+            platform_cones=self.platform_cones + missing[count : 2 * count],
             distance_mm=distance if distance or not self.distance_mm else -ROUNDING,
         )

@@ -8,6 +8,7 @@ import numpy as np
 
 from hexacell.kinematics.geometry import Geometries, Geometry
 from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.parameters import CONSTRAINTS
 from hexacell.kinematics.pose import SAME_FRAMES, FrameTransform, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.limits.gauge_travel import GaugeRoom, GaugeTravel, Three
@@ -142,7 +143,9 @@ class Limits:
     @property
     def joint_ranges(self) -> tuple[tuple[float, float], ...]:
         """Smallest and largest joint variable of each leg, mm."""
-        lowest, highest = (np.broadcast_to(limit, 6) for limit in (self.joint_min, self.joint_max))
+        of_each = max(np.size(self.joint_min), np.size(self.joint_max))
+        legs = of_each if of_each > 1 else CONSTRAINTS
+        lowest, highest = (np.broadcast_to(limit, legs) for limit in (self.joint_min, self.joint_max))
         return tuple(zip(lowest.tolist(), highest.tolist(), strict=True))
 
     def orientations(self, turns: Array) -> Array:

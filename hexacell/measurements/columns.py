@@ -20,12 +20,14 @@ def columns_of(measurements: MeasurementSet) -> dict[str, NDArray[Any]]:
     ``x y z`` mm, ``a b c`` deg, ``q1`` to ``q6`` mm or deg, ``dx dy dz`` mm, ``point`` and ``orientation``
     from 1; ``d1`` to ``d6``, ``t1`` to ``t6``, ``tb`` and ``time_s`` where a record has any.
     """
-    poses = np.array([one.pose.as_tuple() for one in measurements.records], dtype=float).reshape(-1, 6)
-    numbers = np.hstack([poses, measurements.joints, measurements.deviations])
+    count = len(measurements)
+    poses = np.array([one.pose.as_tuple() for one in measurements.records], dtype=float).reshape(count, 6)
+    joints = measurements.joints
+    numbers = np.hstack([poses, joints, measurements.deviations])
     found: dict[str, NDArray[Any]] = dict(zip(csv_file.COUNTS, measurements.labels.T, strict=True))
-    found |= zip(csv_file.NUMBERS, numbers.T, strict=True)
+    found |= zip(csv_file.numbers_of(joints.shape[1]), numbers.T, strict=True)
     if measurements.directions.any():
-        found |= zip(csv_file.DIRECTIONS, measurements.directions.T, strict=True)
+        found |= zip(csv_file.directions_of(joints.shape[1]), measurements.directions.T, strict=True)
     if np.isfinite(measurements.temperatures).any():
         found |= zip(csv_file.TEMPERATURES, measurements.temperatures.T, strict=True)
     if np.isfinite(measurements.times_s).any():
@@ -54,6 +56,6 @@ def measurements_of(columns: Mapping[str, ArrayLike]) -> MeasurementSet:
 
 def _cell(name: str, value: object) -> object:
     """A value as a file has it: 3 where an array has 3.0, and nothing where an optional one is NaN."""
-    if name in csv_file.NUMBERS or not isinstance(value, float):
+    if name in csv_file.numbers_of(csv_file.MOST_JOINTS) or not isinstance(value, float):
         return value
     return "" if np.isnan(value) else f"{value:.17g}"

@@ -2,17 +2,17 @@
 
 One row per record, with the header ``point,orientation,x,y,z,a,b,c,q1,...,q6,dx,dy,dz``: the pose as
 commanded, mm and deg, the joint variables by the encoders, mm or deg as the mechanism has them, and the
-deviation from the point's first row, mm. There may also be ``d1,...,d6``: whether each joint last moved up,
-1, or down, -1; 0 or empty where that is not known; some of ``t1,...,t6,tb``: the temperatures of legs and
-base, deg C; and ``time_s``: when the row was measured, s from any moment; both empty where not known. The
-order of the columns is free; others are ignored.
+deviation from the point's first row, mm. A robot with fewer joints has as many q. There may also be
+``d1,...,d6``: whether each joint last moved up, 1, or down, -1; 0 or empty where that is not known; some
+of ``t1,...,t6,tb``: the temperatures of legs and base, deg C; and ``time_s``: when the row was measured, s
+from any moment; both empty where not known. The order of the columns is free; others are ignored.
 """
 
 import csv
 import io
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from pathlib import Path
 
 from hexacell.cell.fields import LARGEST_NUMBER, LARGEST_TIME_S
@@ -23,11 +23,8 @@ from hexacell.storage.atomic_files import read_text, write_own
 from hexacell.storage.toml_document import shortened
 
 COUNTS = ("point", "orientation")
-NUMBERS = (*"xyzabc", "q1", "q2", "q3", "q4", "q5", "q6", "dx", "dy", "dz")
-HEADER = (*COUNTS, *NUMBERS)
-POSE_HEADER = HEADER[:8]
-DIRECTIONS = ("d1", "d2", "d3", "d4", "d5", "d6")
-"""Columns of a file with records of which it is known from which side joints arrived."""
+POSE_HEADER = (*COUNTS, *"xyzabc")
+DEVIATIONS = ("dx", "dy", "dz")
 
 TEMPERATURES = ("t1", "t2", "t3", "t4", "t5", "t6", "tb")
 """Columns of a file with records of which it is known how warm legs and base were."""
@@ -35,12 +32,23 @@ TEMPERATURES = ("t1", "t2", "t3", "t4", "t5", "t6", "tb")
 TIME = "time_s"
 """Column of a file with records of which it is known when they were measured."""
 
+FEWEST_JOINTS, MOST_JOINTS = 4, 6
 LARGEST_COUNT = 1_000_000
 MOST_RECORDS = 2000
 """An identification from so many takes a quarter of a minute."""
 
 LARGEST_FILE_BYTES = 5_000_000
 csv.field_size_limit(LARGEST_FILE_BYTES)  # a column that is ignored may hold anything
+
+
+def numbers_of(joints: int) -> tuple[str, ...]:
+    """Columns of numbers of a robot with so many joints."""
+    return (*"xyzabc", *(f"q{leg}" for leg in range(1, joints + 1)), *DEVIATIONS)
+
+
+def directions_of(joints: int) -> tuple[str, ...]:
+    """Columns of a file with records of which it is known from which side joints arrived."""
+    return tuple(f"d{leg}" for leg in range(1, joints + 1))
 
 
 def read_measurements(path: Path | str, *, allow_partial: bool = False) -> MeasurementSet:
@@ -62,7 +70,7 @@ def read_measurements(path: Path | str, *, allow_partial: bool = False) -> Measu
 
 def measurements_in(path: Path, text: str, *, allow_partial: bool = False) -> MeasurementSet:
     """The records in the text of a measurement file; raises as ``read_measurements`` does."""
-    records = _records(path, text, HEADER)
+    records = _records(path, text)
     if not allow_partial and not records:
         raise FileError("there are no measurements in it", subject=path, action="Measure some first")
     rows = Counter(point for point, _ in records)
@@ -76,7 +84,7 @@ def measurements_in(path: Path, text: str, *, allow_partial: bool = False) -> Me
 
 def read_poses(path: Path) -> list[tuple[int, int, Pose]]:
     """Read line, point and pose of each row; only the columns of the poses are required."""
-    records = _records(path, read_text(path, LARGEST_FILE_BYTES), POSE_HEADER).values()
+    records = _records(path, read_text(path, LARGEST_FILE_BYTES), poses_alone=True).values()
     return [(line, record.point, record.pose) for line, record in records]
 
 
@@ -84,10 +92,11 @@ def write_measurements(path: Path, measurements: MeasurementSet) -> None:
     """Write a measurement file, in one step; every number reads back exactly."""
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
-    arrived = DIRECTIONS if any(one.directions for one in measurements.records) else ()
+    joints = len(measurements.records[0].joints) if measurements.records else MOST_JOINTS
+    arrived = directions_of(joints) if any(one.directions for one in measurements.records) else ()
     warm = TEMPERATURES if any(one.temperatures for one in measurements.records) else ()
     timed = (TIME,) if any(one.time_s is not None for one in measurements.records) else ()
-    rows.writerow([*HEADER, *arrived, *warm, *timed])
+    rows.writerow([*COUNTS, *numbers_of(joints), *arrived, *warm, *timed])
     for one in measurements.records:
         numbers = (*one.pose.as_tuple(), *one.joints, *one.deviation)
         directions = one.directions or ("",) * len(arrived)
@@ -99,14 +108,17 @@ def write_measurements(path: Path, measurements: MeasurementSet) -> None:
     write_own(path, text.getvalue().encode())
 
 
-def _records(path: Path, text: str, wanted: tuple[str, ...]) -> dict[RecordId, tuple[int, Record]]:
-    """The records, each with its line, in the order of the file; ``wanted`` are the first of ``HEADER``."""
+def _records(path: Path, text: str, *, poses_alone: bool = False) -> dict[RecordId, tuple[int, Record]]:
+    """The records, each with its line, in the order of the file."""
     rows = _filled_rows(path, text)
     line, header = next(rows, (1, []))
-    if wanted == HEADER:
-        names = {name.strip() for name in header}
-        arrived = DIRECTIONS if names.intersection(DIRECTIONS) else ()
-        wanted = (*HEADER, *arrived, *(name for name in (*TEMPERATURES, TIME) if name in names))
+    names = {name.strip() for name in header}
+    joints = _joints_in(names)
+    wanted: tuple[str, ...] = POSE_HEADER
+    if not poses_alone:
+        arrived = directions_of(joints) if names.intersection(directions_of(joints)) else ()
+        further = (name for name in (*TEMPERATURES, TIME) if name in names)
+        wanted = (*COUNTS, *numbers_of(joints), *arrived, *further)
     columns = _columns(path, line, header, wanted)
     found: dict[RecordId, tuple[int, Record]] = {}
     latest: dict[int, float] = {}
@@ -116,7 +128,7 @@ def _records(path: Path, text: str, wanted: tuple[str, ...]) -> dict[RecordId, t
             problem = f"the row has {len(row)} cells, the header {len(header)}{hint}"
             raise FileError(problem, subject=path, line=line, action="Correct this row")
         cells = {name: row[column] for name, column in zip(wanted, columns, strict=True)}
-        record = _record(path, line, cells)
+        record = _record(path, line, cells, joints)
         if record.id in found:
             where, other = f"point {record.point}, orientation {record.orientation}", found[record.id][0]
             problem = f"{where} is here and in line {other}"
@@ -133,6 +145,12 @@ def _records(path: Path, text: str, wanted: tuple[str, ...]) -> dict[RecordId, t
             problem = f"there are more than {MOST_RECORDS} records"
             raise FileError(problem, subject=path, line=line, action=action)
     return found
+
+
+def _joints_in(names: Set[str]) -> int:
+    """How many joints the columns are of: all of them, unless the last ones are not there."""
+    last = max((n for n in range(1, MOST_JOINTS + 1) if f"q{n}" in names), default=MOST_JOINTS)
+    return last if last >= FEWEST_JOINTS else MOST_JOINTS
 
 
 def _filled_rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
@@ -166,22 +184,23 @@ def _columns(path: Path, line: int, header: list[str], wanted: tuple[str, ...]) 
     raise FileError(problem, subject=path, line=line, action=f"The header must be {','.join(wanted)}")
 
 
-def _record(path: Path, line: int, cells: Mapping[str, str]) -> Record:
+def _record(path: Path, line: int, cells: Mapping[str, str], count: int) -> Record:
     """The record in the cells of one row, by their columns; what is not there is 0."""
-    numbers = [_number(path, line, name, cells.get(name, "0")) for name in HEADER]
+    header = (*COUNTS, *numbers_of(count))
+    numbers = [_number(path, line, name, cells.get(name, "0")) for name in header]
     point, orientation = int(numbers[0]), int(numbers[1])
-    q1, q2, q3, q4, q5, q6, dx, dy, dz = numbers[8:]
-    joints, deviation = (q1, q2, q3, q4, q5, q6), (dx, dy, dz)
+    *joints, dx, dy, dz = numbers[8:]
     time = cells.get(TIME, "").strip()
     time_s = _number(path, line, TIME, time) if time else None
-    further = _directions(path, line, cells), _temperatures(path, line, cells), time_s
-    return Record(point, orientation, Pose(*numbers[2:8]), joints, deviation, *further)
+    further = _directions(path, line, cells, count), _temperatures(path, line, cells), time_s
+    return Record(point, orientation, Pose(*numbers[2:8]), tuple(joints), (dx, dy, dz), *further)
 
 
-def _directions(path: Path, line: int, cells: Mapping[str, str]) -> Directions:
+def _directions(path: Path, line: int, cells: Mapping[str, str], joints: int) -> Directions:
     """From which side the joints arrived; empty if no cell says it."""
-    stated = [cells.get(name, "").strip() for name in DIRECTIONS]
-    for name, cell in zip(DIRECTIONS, stated, strict=True):
+    names = directions_of(joints)
+    stated = [cells.get(name, "").strip() for name in names]
+    for name, cell in zip(names, stated, strict=True):
         if cell not in {"", "0", "1", "-1"}:
             problem = f'{name} is "{shortened(cell)}", but must be 1, -1, 0 or empty'
             raise FileError(problem, subject=path, line=line, action="Correct this cell")

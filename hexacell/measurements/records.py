@@ -10,17 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexacell.errors import UsageError
+from hexacell.kinematics.parameters import CONSTRAINTS
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 
 Scalar = TypeVar("Scalar", bound=np.generic)
-Joints = tuple[float, float, float, float, float, float]
+Joints = tuple[float, ...]
+"""A number for each driven joint."""
+
 Deviation = tuple[float, float, float]
 Directions = tuple[int, ...]
 """Whether each joint last moved up, 1, or down, -1; 0 where that is not known."""
 
 Temperatures = tuple[float | None, ...]
-"""Temperatures of legs 1 to 6 and of the base, deg C; None if not known; empty where nothing is."""
+"""Temperatures of legs 1 to 6 and of the base, deg C; None if not known, as of legs that a machine lacks;
+empty where nothing is."""
 
 MEASURED_PARTS = 7
 
@@ -29,9 +33,8 @@ RecordId = tuple[int, int]
 
 
 def joints_of(values: Array) -> Joints:
-    """Joint variables (6,), mm, as numbers."""
-    q1, q2, q3, q4, q5, q6 = (float(value) for value in values)
-    return q1, q2, q3, q4, q5, q6
+    """Joint variables (J,), mm, as numbers."""
+    return tuple(float(value) for value in values)
 
 
 def deviation_of(values: Array) -> Deviation:
@@ -48,7 +51,7 @@ class Record:
         point: at which of the cell's points the gauges are placed, from 1.
         orientation: the pose at this point, from 1.
         pose: as commanded, under the geometry in the controller at that time.
-        joints: joint variables q1 to q6 from the encoders, mm or deg.
+        joints: joint variables q1, q2, ... from the encoders, mm or deg.
         deviation: of the ball from its position when the gauges were zeroed, along base x, y, z, mm.
         directions: from which side each joint arrived; empty where nothing is known of that.
         temperatures: of legs and base.
@@ -129,8 +132,10 @@ class MeasurementSet:
 
     @cached_property
     def joints(self) -> Array:
-        """Joint variables (n, 6), in their unit."""
-        return _frozen(np.array([record.joints for record in self.records], dtype=float).reshape(-1, 6))
+        """Joint variables (n, J), in their unit."""
+        return _frozen(
+            np.array([record.joints for record in self.records], dtype=float).reshape(self._shape)
+        )
 
     @cached_property
     def deviations(self) -> Array:
@@ -139,9 +144,14 @@ class MeasurementSet:
 
     @cached_property
     def directions(self) -> Array:
-        """From which side each joint arrived (n, 6): 1 from below, -1 from above, 0 where not known."""
-        rows = [record.directions or (0,) * 6 for record in self.records]
-        return _frozen(np.array(rows, dtype=float).reshape(-1, 6))
+        """From which side each joint arrived (n, J): 1 from below, -1 from above, 0 where not known."""
+        rows = [record.directions or (0,) * len(record.joints) for record in self.records]
+        return _frozen(np.array(rows, dtype=float).reshape(self._shape))
+
+    @property
+    def _shape(self) -> tuple[int, int]:
+        """How many records there are, and of how many joints."""
+        return len(self.records), len(self.records[0].joints) if self.records else CONSTRAINTS
 
     @cached_property
     def temperatures(self) -> Array:

@@ -12,7 +12,7 @@ from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import Directions
 
-UNKNOWN: Directions = (0,) * 6
+UNKNOWN: Directions = ()
 
 SURE_WAY = {JointUnit.MM: 0.3, JointUnit.DEG: 0.1}
 """A way after which a joint has gone through its lost motion.
@@ -45,15 +45,15 @@ def arrival_directions(joints: Array, before: Sequence[int], least: float) -> Di
     anywhere within its lost motion. It lies as before only if it went further the same way, or not at all.
 
     Args:
-        joints: (k, 6) along the move, in their unit, so densely that reversals between rows are small.
+        joints: (k, J) along the move, in their unit, so densely that reversals between rows are small.
         before: the directions in which the joints had arrived where the move begins; empty: not known.
         least: as of :func:`least_way`.
     """
     if not np.isfinite(joints).all():  # somewhere no joint variables belong to the line
-        return UNKNOWN
+        return (0,) * int(joints.shape[1])
     return tuple(
         _direction([float(value) for value in way], one, least)
-        for way, one in zip(joints.T, before or UNKNOWN, strict=True)
+        for way, one in zip(joints.T, before or (0,) * joints.shape[1], strict=True)
     )
 
 

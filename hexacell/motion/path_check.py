@@ -83,14 +83,16 @@ class LinesFrom:
         belief = self._belief
         limits = belief.limits
         fine = interpolate_lines((self.start, *waypoints, ends), JOINT_REFINEMENT, limits.frames)
-        fine_joints = belief.commanded.joints(fine.in_shape(-1)).reshape(-1, len(ends), 6)
+        fine_joints = belief.commanded.joints(fine.in_shape(-1)).reshape(
+            -1, len(ends), belief.mechanism.joint_count
+        )
         allowed = limits.allow_commands(fine.in_shape(-1)).reshape(-1, len(ends))
         rows = np.flatnonzero((allowed & limits.allow_joints(fine_joints)).all(axis=0))
         commands, joints = fine[::JOINT_REFINEMENT], fine_joints[::JOINT_REFINEMENT]
         rows = rows[self._keeps_margin(belief.controller, commands, joints, rows)]
         actual, rows = self._trace(commands, joints, rows, thorough=thorough)
         rows = rows[self._keeps_margin(belief.estimate, actual, joints, rows)]
-        at = actual[:, rows].in_shape(-1), joints[:, rows].reshape(-1, 6)
+        at = actual[:, rows].in_shape(-1), joints[:, rows].reshape(-1, joints.shape[-1])
         kept = belief.keeps_limits(*at, self._wanted_margins).reshape(len(joints), len(rows))
         rows = rows[kept.all(axis=0)]
         is_open = np.zeros(len(ends), dtype=bool)
@@ -106,7 +108,7 @@ class LinesFrom:
     ) -> Mask:
         """Which of some lines stay clear of the singularities of a geometry."""
         least = MARGIN_SHARE * self.belief.limits.singularity_margin
-        at = poses[:, rows].in_shape(-1), joints[:, rows].reshape(-1, 6)
+        at = poses[:, rows].in_shape(-1), joints[:, rows].reshape(-1, joints.shape[-1])
         found = margin_and_mode(self.belief.mechanism, geometry, *at, least)
         # A singularity between two samples shows as another assembly mode beyond it.
         keeps, mode = (one.reshape(len(joints), len(rows)) for one in found)

@@ -116,7 +116,7 @@ class _Robot:
         result = forward_kinematics(
             self.mechanism,
             self.geometry,
-            joints.reshape(-1, 6),
+            joints.reshape(-1, joints.shape[-1]),
             predicted.in_shape(-1),
             mode=self.mode.repeat(shape[0] * shape[1]),
             tolerance_mm=TOLERANCE_MM,

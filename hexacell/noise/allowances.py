@@ -19,7 +19,7 @@ from hexacell.distributions import chi_square_exceedance, normal_probability, st
 from hexacell.errors import LimitError
 from hexacell.identification.solver.result import Identification
 from hexacell.identification.solver.term_estimates import TermEstimates
-from hexacell.kinematics.parameters import LEGS
+from hexacell.kinematics.parameters import CONSTRAINTS
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from hexacell.noise.ball_by_encoders import BallByEncoders
@@ -76,7 +76,9 @@ class Allowances:
         visits = self.settings.noise.revisits
         if not self.is_measured or not visits or self.stops <= self.settings.noise.stops:
             return SIGMAS
-        return student_limit(LEGS * visits, float(normal_probability(np.array(-SIGMAS))))
+        return student_limit(
+            self.robot.mechanism.joint_count * visits, float(normal_probability(np.array(-SIGMAS)))
+        )
 
     @property
     def scatters(self) -> bool:
@@ -116,7 +118,7 @@ class Allowances:
         is_fixed = self.settings.guards.limits == "fixed"
         by_drift = readings * noise.walk.step_mm**2 * np.eye(3)
         explicable = SIGMAS * np.sqrt(np.diag(covariance + by_drift))
-        unknown = np.zeros(LEGS) if unknown is None else unknown
+        unknown = np.zeros(len(joints)) if unknown is None else unknown
         unexplained, sides = change[:3] - ball.motion(joints), ball.by_joints * unknown
         whole = covariance + by_drift + sides @ sides.T
         explicable = explicable + np.abs(ball.by_joints) @ unknown
@@ -131,7 +133,7 @@ class Allowances:
             explicable_joints=0.0 if is_fixed else float(np.sqrt(2.0)) * self.stop_sigmas * self.stops,
             readings=readings,
             by_joints=ball.by_joints,
-            chance_joints=chance if is_known else np.full(LEGS, np.inf),
+            chance_joints=chance if is_known else np.full(len(joints), np.inf),
             at_rest=readings_covariance + ball.covariance(joints - np.diag(joints)),
             by_drift=by_drift,
             probability=chi_square_exceedance(
@@ -141,7 +143,7 @@ class Allowances:
 
     def between_visits(self, reference: Pose, visits: Array) -> "tuple[ReferenceChange, ...]":
         """The changes between m visits (m, 9) of one reference, as m - 1 that are independent."""
-        return tuple(self.since(reference, np.zeros(9), one) for one in contrasts(visits))
+        return tuple(self.since(reference, np.zeros_like(one), one) for one in contrasts(visits))
 
     def mounting_mm(self, reference: Pose) -> Array:
         """How far each plunger (3,) may stand from the middle of its travel when the gauges are zeroed.
@@ -217,9 +219,9 @@ class ReferenceChange:
     joints: Array
     explicable_joints: float
     readings: float = 0
-    by_joints: Array = field(default_factory=lambda: np.zeros((3, LEGS)))
-    chance_joints: Array = field(default_factory=lambda: np.full(LEGS, np.inf))
-    at_rest: Array = field(default_factory=lambda: np.zeros((LEGS, 3, 3)))
+    by_joints: Array = field(default_factory=lambda: np.zeros((3, CONSTRAINTS)))
+    chance_joints: Array = field(default_factory=lambda: np.full(CONSTRAINTS, np.inf))
+    at_rest: Array = field(default_factory=lambda: np.zeros((CONSTRAINTS, 3, 3)))
     by_drift: Array = field(default_factory=lambda: np.zeros((3, 3)))
     probability: float = 1.0
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from hexacell.cell.fields import Frozen
 from hexacell.distributions import chi_square_exceedance, chi_square_limit
-from hexacell.kinematics.parameters import LEGS, JointUnit
+from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.rotations import Array
 from hexacell.noise.ball_by_encoders import BallByEncoders
 from hexacell.noise.standstill import SIGNIFICANCE
@@ -54,12 +54,11 @@ class ScatterSource(StrEnum):
     ENCODER_5 = "encoder 5"
     ENCODER_6 = "encoder 6"
 
-    @property
-    def instruments(self) -> Array:
-        """Which of gauges x, y, z and the encoders of legs 1 to 6 it is noise of: (9,), 1 or 0."""
+    def instruments(self, encoders: int) -> Array:
+        """Which of gauges x, y, z and so many encoders it is noise of: (3 + J,), 1 or 0."""
         if self in TOGETHER:
-            return np.repeat([0.0, 1.0], [3, LEGS])
-        return np.asarray(np.eye(3 + LEGS)[ALONE.index(self)])
+            return np.repeat([0.0, 1.0], [3, encoders])
+        return np.asarray(np.eye(3 + encoders)[ALONE.index(self)])
 
 
 TOGETHER = (ScatterSource.JOINTS, ScatterSource.ENCODERS)
@@ -111,7 +110,7 @@ def approach_scatter(
     """The scatter of m visits of one pose; None with fewer than ``FEWEST_VISITS``.
 
     By ``deviations`` of the ball along base x, y, z (m, 3), mm, and what the encoders showed, ``joints``
-    (m, 6). ``encoders`` (6,) and ``gauges_mm`` (3,) are their stated noise in a record.
+    (m, J). ``encoders`` (J,) and ``gauges_mm`` (3,) are their stated noise in a record.
     """
     if len(deviations) < FEWEST_VISITS:
         return None
@@ -122,7 +121,7 @@ def approach_scatter(
     stated[:3, :3] += ball.covariance(around[:, 3:]).sum(axis=0) / (len(shown) - 1)
     visits = _Visits(
         products=around.T @ around,
-        motion=np.concatenate([ball.by_joints, np.eye(LEGS)]),
+        motion=np.concatenate([ball.by_joints, np.eye(joints.shape[1])]),
         stated=stated,
         freedom=len(shown) - 1,
     )
@@ -138,13 +137,15 @@ def approach_scatter(
     )
     if chi_square_exceedance(freedom, chi_square) >= SIGNIFICANCE:
         return found
-    excesses = {source: visits.excess(source) for source in ScatterSource}
+    single = ALONE[: len(instruments)]
+    excesses = {source: visits.excess(source) for source in (*TOGETHER, *single)}
     together = max(TOGETHER, key=lambda one: excesses[one][0])
-    alone = max(ALONE, key=lambda one: excesses[one][0])
+    alone = max(single, key=lambda one: excesses[one][0])
     is_alone = excesses[alone][0] >= excesses[together][0] + np.log(INSTRUMENT_ODDS)
     source = alone if is_alone else together
-    unit, excess = JointUnit.MM if source.instruments[:3].any() else joint_unit, excesses[source][1]
-    by_encoders = 0.0 if source is ScatterSource.JOINTS else excess**2 * source.instruments[3:]
+    concerned = source.instruments(joints.shape[1])
+    unit, excess = JointUnit.MM if concerned[:3].any() else joint_unit, excesses[source][1]
+    by_encoders = 0.0 if source is ScatterSource.JOINTS else excess**2 * concerned[3:]
     stops = _stops(visits, encoders**2 + by_encoders)
     return found.model_copy(update={"source": source, "unit": unit, "excess": excess, "stops": stops})
 
@@ -152,7 +153,7 @@ def approach_scatter(
 def _stops(visits: "_Visits", variances: Array) -> float:
     """One standard deviation of where a joint stops; zero where the variances of encoders explain it."""
     squares, freedom = np.diag(visits.products)[3:], visits.freedom
-    if chi_square_exceedance(LEGS * freedom, float(np.sum(squares / variances))) >= SEEN:
+    if chi_square_exceedance(len(squares) * freedom, float(np.sum(squares / variances))) >= SEEN:
         return 0.0
     return float(np.sqrt(max(0.0, float(np.mean(squares / freedom - variances)))))
 
@@ -162,9 +163,9 @@ class _Visits:
     """Visits of one pose, one more than ``freedom``.
 
     Attributes:
-        products: (9, 9), mm^2, of ball and joints less their means, summed over the visits.
-        motion: (9, 6) of ball and encoders by the stops of the joints.
-        stated: (9, 9) covariance of the instruments.
+        products: (3 + J, 3 + J), mm^2, of ball and joints less their means, summed over the visits.
+        motion: (3 + J, J) of ball and encoders by the stops of the joints.
+        stated: (3 + J, 3 + J) covariance of the instruments.
     """
 
     products: Array
@@ -182,11 +183,14 @@ class _Visits:
         """The largest log likelihood with one more variance, and its standard deviation, mm."""
         from scipy.optimize import minimize_scalar  # noqa: PLC0415 - its import takes half a second
 
-        added = np.diag(source.instruments)
+        concerned = source.instruments(self.motion.shape[1])
+        added = np.diag(concerned)
         if source is ScatterSource.JOINTS:
-            moved = np.concatenate([self.motion[:3], np.zeros((LEGS, LEGS))])
+            moved = np.concatenate(
+                [self.motion[:3], np.zeros((len(self.motion) - 3, self.motion.shape[1]))]
+            )
             added = moved @ moved.T
-        unit = float(np.sqrt(np.diag(self.stated)[source.instruments > 0.0].mean()))
+        unit = float(np.sqrt(np.diag(self.stated)[concerned > 0.0].mean()))
 
         def loss(log_size: float) -> float:
             return -self._best_stops(self.stated + (unit * np.exp(log_size)) ** 2 * added, unit)

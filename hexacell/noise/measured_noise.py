@@ -1,6 +1,6 @@
 """The noise that a run has measured at its start, and what follows from it for everything after."""
 
-from hexacell.cell.fields import Frozen, Point, SixNumbers
+from hexacell.cell.fields import Frozen, Point
 from hexacell.cell.model import CellSettings
 from hexacell.cell.uncertainty import STOPS, repeatability_key
 from hexacell.kinematics.parameters import JointUnit
@@ -64,7 +64,7 @@ class MeasuredNoise(Frozen):
 def with_measured_noise(settings: CellSettings, measured: MeasuredNoise) -> CellSettings:
     """The settings of a cell with what was measured in the place of what they state."""
     gauges: Point = tuple(one.record for one in measured.gauges)  # type: ignore[assignment]
-    encoders: SixNumbers = tuple(one.record for one in measured.encoders)  # type: ignore[assignment]
+    encoders: tuple[float, ...] = tuple(one.record for one in measured.encoders)
     stated, approaches = settings.noise, measured.approaches
     stops = stated.stops
     if approaches is not None:  # as measured, unless more is stated and holds

@@ -28,9 +28,6 @@ from hexacell.noise.ball_by_encoders import BallByEncoders
 from hexacell.noise.standstill import SIGNIFICANCE, ReadingNoise, reading_noise
 from hexacell.uncertainty.statement import COVERAGE_FACTOR
 
-INSTRUMENTS = 9
-"""Three gauges and six encoders, which share the significance of one test."""
-
 LEAST_SHARE = 0.3
 """Share of what is stated from which the readings count too: less makes it larger by 5 % at most."""
 
@@ -53,9 +50,9 @@ class NoiseReadings:
 
     Attributes:
         reference: its pose, in the controller's frames.
-        series: readings at standstill (n, 9), mm: gauges x, y, z, then the encoders; n may be zero.
+        series: readings at standstill (n, 3 + J), mm: gauges x, y, z, then the encoders; n may be zero.
         steps: of their displays (9,), mm.
-        visits: means of the settled windows at each visit (m, 9), mm, the first one included.
+        visits: means of the settled windows at each visit (m, 3 + J), mm, the first one included.
     """
 
     reference: Pose
@@ -153,7 +150,7 @@ class _NoiseAssessment:
             allowed = self.stated * min(scatter.ratio_at_most, 1.0)  # less than stated, if visits prove it
         one = self._at_least(allowed)
         if scatter is not None and scatter.source is not None:
-            one = np.hypot(one, scatter.excess * scatter.source.instruments)
+            one = np.hypot(one, scatter.excess * scatter.source.instruments(len(one) - 3))
         if not self.reading_noise or windows == 1:
             return one
         count = self.readings.window_readings
@@ -172,8 +169,8 @@ class _NoiseAssessment:
     def _readings_exceed(self, sigma: Array) -> Mask:
         """The instruments (9,) whose readings alone make a record noisier than ``sigma`` (9,)."""
         if not self.reading_noise:
-            return np.zeros(INSTRUMENTS, dtype=bool)
-        count, significance = self.readings.window_readings, SIGNIFICANCE / INSTRUMENTS
+            return np.zeros(len(self.stated), dtype=bool)
+        count, significance = self.readings.window_readings, SIGNIFICANCE / len(self.stated)
         each = zip(self.reading_noise, sigma.tolist(), strict=True)
         return np.array([noise.exceeds(mm, count, significance) for noise, mm in each])
 
@@ -181,8 +178,11 @@ class _NoiseAssessment:
         """The noise of each, in records that are means of some windows."""
         records = self.of_records(windows)
         gauges = sorted(self.plan.settings.gauges, key=lambda gauge: gauge.axis)
-        names = [*(f"gauge {one.name}" for one in gauges), *(f"encoder {leg}" for leg in range(1, 7))]
-        units = [JointUnit.MM] * 3 + [self.plan.robot.mechanism.words.joint_unit] * 6
+        names = [
+            *(f"gauge {one.name}" for one in gauges),
+            *(f"encoder {leg + 1}" for leg in range(len(self.stated) - 3)),
+        ]
+        units = [JointUnit.MM] * 3 + [self.plan.robot.mechanism.words.joint_unit] * (len(names) - 3)
         larger = self._readings_exceed(self.stated)
         for row, (name, unit) in enumerate(zip(names, units, strict=True)):
             yield measured_noise.InstrumentNoise(

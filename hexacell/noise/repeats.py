@@ -21,7 +21,6 @@ from hexacell.distributions import chi_square_exceedance
 from hexacell.identification.problem.prior import Noise
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.result import Identification
-from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.noise.allowances import ReferenceChange
 from hexacell.noise.approach_scatter import RepeatedApproaches
@@ -94,7 +93,7 @@ class Repeats:
         significance: float = SIGNIFICANCE,
     ) -> "Repeats":
         """By visits of one reference, changes of readings at others, and what was found with that noise."""
-        seen = np.inf if approaches is None else float(LEGS * (approaches.visits - 1))
+        seen = np.inf if approaches is None else float(noise.joint_count * (approaches.visits - 1))
         is_measured = approaches is not None and approaches.source is not None
         is_of_fit = found is not None and found.problem.noise.encoder <= noise.encoder * (1.0 + 1e-6)
         goodness = found.goodness if found and is_of_fit else NO_RESIDUALS

@@ -15,9 +15,9 @@ from hexacell.identification.identified_zeros import IdentifiedZeros, ParameterC
 from hexacell.identification.solver import result
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.parameters import LEGS, ParameterSet
+from hexacell.kinematics.parameters import ParameterSet
 from hexacell.kinematics.rotations import Array
-from hexacell.measurements.records import Deviation, RecordId, Temperatures
+from hexacell.measurements.records import MEASURED_PARTS, Deviation, RecordId, Temperatures
 from hexacell.results.term_result import TermResult, term_results
 from hexacell.uncertainty.statement import COVERAGE_FACTOR
 
@@ -166,7 +166,8 @@ class IdentificationResult(Frozen):
 
 def legs_at(temperatures_c: Temperatures) -> str:
     """The temperatures of legs in words: "legs at 20.0 to 21.5 deg C"; empty where none is known."""
-    if not (known := [celsius for celsius in temperatures_c[:LEGS] if celsius is not None]):
+    of_legs = temperatures_c[: MEASURED_PARTS - 1]
+    if not (known := [celsius for celsius in of_legs if celsius is not None]):
         return ""
     lowest, highest = (f"{limit(known):.1f}" for limit in (min, max))
     return f"legs at {lowest if lowest == highest else f'{lowest} to {highest}'} deg C"

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from hexacell.cell.fields import Frozen
+from hexacell.cell.fields import Frozen, JointNumbers
 from hexacell.cell.model import CellSettings
 from hexacell.identification.solver.result import Identification
 from hexacell.identification.terms.term import Finding, ModelTerm
-from hexacell.kinematics.corrections import NO_CORRECTIONS, NONE, CorrectionKind, Corrections, Six
+from hexacell.kinematics.corrections import NO_CORRECTIONS, NONE, CorrectionKind, Corrections
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import joints_of
 
@@ -45,8 +45,8 @@ class TermResult(Frozen):
     rival: str = ""
     told_by: str = ""
     unit: str = ""
-    values: Six | None = None
-    sigma: Six | None = None
+    values: JointNumbers | None = None
+    sigma: JointNumbers | None = None
 
     @property
     def is_taken(self) -> bool:

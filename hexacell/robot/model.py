@@ -28,8 +28,8 @@ from hexacell.identification.thermal_expansion import ThermalExpansion
 from hexacell.kinematics.commanded_motion import CommandedRobot, RefusedCommands
 from hexacell.kinematics.corrections import NO_CORRECTIONS, CorrectionKind, Corrections
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Branch, Mechanism, joint_zeros
-from hexacell.kinematics.pose import FrameTransform, Pose, PoseBatch
+from hexacell.kinematics.mechanism import Branch, Mechanism, completed_pose, joint_zeros
+from hexacell.kinematics.pose import AXES, FrameTransform, Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.limits.limits import Limits
 from hexacell.measurements.records import MeasurementSet
@@ -228,11 +228,15 @@ class Robot:
 
     def from_commands(self, commands: Iterable[Pose]) -> PoseBatch:
         """Poses (n) commanded in the controller's frames, in the convention's frames."""
-        return self.frames.poses(PoseBatch.of(commands))
+        commanded = PoseBatch.of(commands)
+        if self.mechanism.joint_count < len(AXES):
+            commanded = self.mechanism.completed(self.for_controller(self.commanding), commanded)
+        return self.frames.poses(commanded)
 
     def to_command(self, pose: Pose) -> Pose:
         """A pose in the convention's frames, in the controller's frames."""
-        return self.frames.inverse().poses(PoseBatch.of([pose])).pose(0)
+        command = self.frames.inverse().poses(PoseBatch.of([pose])).pose(0)
+        return completed_pose(self.mechanism, self.for_controller(self.commanding), command)
 
 
 def robot_of(cell: Cell) -> Robot:

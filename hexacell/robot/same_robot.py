@@ -16,7 +16,7 @@ from hexacell.errors import FileError, UsageError
 from hexacell.identification.problem.prior import Tolerances
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism
-from hexacell.kinematics.parameters import LEGS, MachinePart, ParameterUnit
+from hexacell.kinematics.parameters import MachinePart, ParameterUnit, each_of
 from hexacell.kinematics.rotations import Array
 
 FARTHEST_DRAWING = 0.25
@@ -30,9 +30,6 @@ UNITS_MM = {"metres": 1000.0, "inches": 25.4, "micrometres": 1e-3}
 
 SAME_SHARE = 0.05
 """Largest difference of two sizes, as a share, that another unit leaves."""
-
-ORDERS = tuple(permutations(range(LEGS)))
-"""All orders of the legs, the stated one first."""
 
 
 def require_frames(mechanism: Mechanism, geometry: Geometry, path: Path, line: int | None = None) -> None:
@@ -98,7 +95,7 @@ def _other_order(
     drawn = _numbers(mechanism, drawing)
     best, words = largest_mm, None
     for what, symbols in _parts(mechanism):
-        for order in ORDERS[1:]:
+        for order in [*permutations(range(mechanism.joint_count))][1:]:
             try:
                 numbers = _numbers(mechanism, reordered(controller, symbols, order))
             except UsageError:
@@ -106,13 +103,17 @@ def _other_order(
             difference = np.abs(numbers - drawn).max()
             if difference < best:
                 legs = " ".join(str(leg + 1) for leg in order)
-                best, words = float(difference), f"{what} 1 to {LEGS} of the drawing are {legs} there"
+                best, words = (
+                    float(difference),
+                    f"{what} 1 to {mechanism.joint_count} of the drawing are {legs} there",
+                )
     return words
 
 
 def _parts(mechanism: Mechanism) -> Iterator[tuple[str, tuple[str, ...]]]:
     """What may be in another order, and the symbols of its parameters."""
-    kinds = mechanism.parameters.kinds
+    legs = each_of(mechanism.joint_count)
+    kinds = [kind for kind in mechanism.parameters.kinds if kind.owners == legs]
     yield "legs", tuple(kind.symbol for kind in kinds)
     for part in (MachinePart.PLATFORM, MachinePart.BASE):
         of_part = (kind for kind in kinds if kind.part is part and kind.unit is ParameterUnit.MM)

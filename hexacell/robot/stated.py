@@ -17,7 +17,7 @@ from hexacell.identification.terms.term import ModelTerm, StatedMachine
 from hexacell.identification.thermal_expansion import ThermalExpansion
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import Branch, joint_zeros
-from hexacell.kinematics.parameters import LEGS, MachinePart
+from hexacell.kinematics.parameters import MachinePart
 from hexacell.kinematics.pose import FrameTransform, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.limits.gauge_travel import GaugeTravel
@@ -35,7 +35,14 @@ def noise_of(settings: CellSettings) -> Noise:
     """The noise of a record that a cell's settings state."""
     stated = settings.noise
     alignment = float(np.radians(settings.stations.alignment_deg))
-    noise = Noise(stated.encoder, stated.gauge_mm, alignment, stated.gauge_scale, stops=stated.stops)
+    noise = Noise(
+        stated.encoder,
+        stated.gauge_mm,
+        alignment,
+        stated.gauge_scale,
+        stops=stated.stops,
+        joint_count=settings.mechanism.joint_count,
+    )
     if stated.encoders is None and stated.gauges_mm is None:
         return noise
     encoders, gauges = noise.encoders.tolist(), noise.gauges_mm.tolist()
@@ -76,9 +83,10 @@ def gauge_travel_of(settings: CellSettings) -> GaugeTravel:
 def _joint_ranges(
     settings: CellSettings, controller: ControllerGeometry
 ) -> tuple[Array, Array, ZeroedRanges | None]:
-    """The narrowest of the stated ranges, (6,) lowest and (6,) highest, and what depends on the zeros."""
+    """The narrowest of the stated ranges, (J,) lowest and (J,) highest, and what depends on the zeros."""
     limits, of_controller = settings.limits, controller.limits.joints
-    lowest, highest = np.full(6, limits.joint_min), np.full(6, limits.joint_max)
+    legs = settings.mechanism.joint_count
+    lowest, highest = np.full(legs, limits.joint_min), np.full(legs, limits.joint_max)
     if limits.joints is not None:
         low, high = np.transpose(limits.joints)
         lowest, highest = np.maximum(lowest, low), np.minimum(highest, high)
@@ -86,24 +94,25 @@ def _joint_ranges(
         return lowest, highest, None
     zeroed = ZeroedRanges(lowest, highest, *np.transpose(of_controller))
     if not settings.controller.joints_include_zeros:
-        return *zeroed.at(np.zeros(6)), None
+        return *zeroed.at(np.zeros(legs)), None
     return *zeroed.at(joint_zeros(settings.mechanism, controller.geometry)), zeroed
 
 
 def _leg_limits(settings: CellSettings, controller: ControllerGeometry) -> LegLimits | None:
     """The limits of passive joints and legs; None if the cell states none."""
     stated, distance = settings.limits.passive_joints, settings.limits.leg_distance_mm
-    cones = [np.broadcast_to(one, LEGS) for one in (stated.base_cone_deg, stated.platform_cone_deg)]
+    legs = settings.mechanism.joint_count
+    cones = [np.broadcast_to(one, legs) for one in (stated.base_cone_deg, stated.platform_cone_deg)]
     if distance == 0.0 and np.min(cones) >= NO_CONE_DEG:
         return None
-    legs = _legs_in_the_middle(settings, controller.branch)
+    middle = _legs_in_the_middle(settings, controller.branch)
     frames = settings.mechanism.normalize_frames(settings.drawing)[1]
-    along = legs.directions
-    base = _unit(legs.in_carriers(along)[0] if stated.base_axes is None else stated.base_axes)
-    platform = (along @ legs.rotations)[0] if stated.platform_axes is None else stated.platform_axes
+    along = middle.directions
+    base = _unit(middle.in_carriers(along)[0] if stated.base_axes is None else stated.base_axes)
+    platform = (along @ middle.rotations)[0] if stated.platform_axes is None else stated.platform_axes
     base_cones, platform_cones = np.radians(cones)
     return LegLimits(
-        base @ frames.base.T if legs.carriers is None else base,
+        base @ frames.base.T if middle.carriers is None else base,
         _unit(platform) @ frames.platform.T,
         base_cones,
         platform_cones,
@@ -234,4 +243,5 @@ def stated_terms(settings: CellSettings) -> tuple[ModelTerm, ...]:
         settings.uncertainty.own_weight_n,
     )
     made = (created(Group.TERMS, name, machine) for name in settings.model.terms)
-    return tuple(term for term in made if term is not None)
+    mean = np.zeros(settings.mechanism.joint_count)
+    return tuple(replace(term, mean=mean) for term in made if term is not None)

@@ -133,7 +133,7 @@ class VirtualRobot:
         model = self.model
         shown = model.frames.base.T @ self._actual_pose.positions[0]
         shown = shown + model.noise.gauges_mm * self.random.standard_normal(3)
-        joints = self._shown[0] + model.noise.encoders * self.random.standard_normal(6)
+        joints = self._shown[0] + model.noise.encoders * self.random.standard_normal(len(self._shown[0]))
         self._zero = shown if self._zero is None else self._zero
         deviation = deviation_of(shown - self._zero)
         return Record(point, orientation, self.command, joints_of(joints), deviation, self._directions)
@@ -167,7 +167,7 @@ class VirtualRobot:
         self._joints_commanded = joints
         if not (stops or self.unseen):
             return
-        scatter = self.random.standard_normal((2, 1, 6))
+        scatter = self.random.standard_normal((2, 1, self.model.mechanism.joint_count))
         self._shown = joints + stops * scatter[0]
         found = continue_solution(
             model.mechanism,

@@ -24,7 +24,7 @@ from hexacell.errors import FileError, HexacellError, ReachError, UsageError, jo
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import Branch
-from hexacell.kinematics.parameters import LEGS, MachinePart, ParameterUnit
+from hexacell.kinematics.parameters import MachinePart, ParameterUnit, each_of
 from hexacell.kinematics.pose import AXES, Pose, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask, from_angles
 from hexacell.kinematics.sensitivity import has_singularity_margin, singularity_margin
@@ -146,7 +146,8 @@ def _others(
 ) -> Iterator[tuple[FileError, CellSettings, ControllerGeometry]]:
     """What may be wrong, and the design without that."""
     settings, parameters = cell.settings, cell.settings.mechanism.parameters
-    for signs in cast("Iterable[Branch]", product((1, -1), repeat=LEGS) if controller.branch else ()):
+    legs = settings.mechanism.joint_count
+    for signs in cast("Iterable[Branch]", product((1, -1), repeat=legs) if controller.branch else ()):
         if signs != controller.branch:
             stated, other = (" ".join(map(str, one)) for one in (controller.branch, signs))
             fact = FileError(
@@ -155,9 +156,11 @@ def _others(
                 action="Correct branch in the controller's config",
             )
             yield fact, settings, replace(controller, branch=signs)
-    of_platform = tuple(kind.symbol for kind in parameters.kinds if kind.part is MachinePart.PLATFORM)
-    for first, way in [*product(range(LEGS), (1, -1))][1:]:  # begun elsewhere, or the other way round
-        order = tuple((first + way * n) % LEGS for n in range(LEGS))
+    on_platform = (kind for kind in parameters.kinds if kind.part is MachinePart.PLATFORM)
+    of_platform = tuple(kind.symbol for kind in on_platform if kind.owners == each_of(legs))
+    orders = [*product(range(legs), (1, -1))][1:] if of_platform else []
+    for first, way in orders:  # begun elsewhere, or the other way round
+        order = tuple((first + way * n) % legs for n in range(legs))
         fact = _of_drawing(
             cell,
             "the joints on the platform are in another order than the legs: they would fit in the order "
@@ -231,7 +234,7 @@ def _cause_of_singularity(legs: Legs) -> str:
     """Why a design is singular, as the end of a sentence; empty if that is not known."""
     base, platform = legs.base_joints[0], legs.platform_joints[0]
     size = float(np.linalg.norm(platform - platform.mean(axis=0), axis=-1).max())
-    for one, other in combinations(range(LEGS), 2):
+    for one, other in combinations(range(len(base)), 2):
         apart = np.linalg.norm([base[one] - base[other], platform[one] - platform[other]], axis=-1)
         if (apart < ALIKE_SHARE * size).all():
             return f"; legs {one + 1} and {other + 1} have both joints in common"

@@ -57,6 +57,7 @@ class PlanTrial:
         averaging: what means of more readings would gain if all noise differed from reading to reading.
         encoders_part_mm: what the encoders contribute to the first of these errors.
         lost_to_speed: minutes that a calibration would take less at twice the speeds with gauges.
+        never_seen: what no record of such a robot shows; empty where that is its frames alone.
         like: the run whose moves and readings it is expected to be as slow as; empty: the usual ones.
     """
 
@@ -67,6 +68,7 @@ class PlanTrial:
     encoders_part_mm: float | None = None
     lost_to_speed: float = 0.0
     like: str = ""
+    never_seen: str = ""
 
 
 def fit_measurements(
@@ -91,6 +93,7 @@ def fit_measurements(
         IdentifiabilityError: the records cannot determine it.
         FileError: the controller's config cannot be read.
     """
+    require_own_joints(cell, measurements)
     robot, settings, measured = robot_of(cell), cell.settings, None
     if folder is not None and folder.journal.is_file():
         from hexacell.services.history.recorded_cell import commanding_geometries, recorded_state  # noqa: PLC0415 - only for a run
@@ -102,7 +105,8 @@ def fit_measurements(
             settings = with_measured_noise(settings, measured)
             robot = robot.with_errors_of(settings)
         robot = replace(robot, noise=replace(robot.noise, walk=run.walk))
-    known = known_parts(one.temperatures for one in measurements.records)
+    temperatures = (one.temperatures for one in measurements.records)
+    known = known_parts(temperatures, robot.mechanism.joint_count)
     robot = replace(robot, effects=stated_effects(settings, known=known))
     if identify_only is not None:
         robot = replace(robot, identifies=identify_only)
@@ -111,6 +115,21 @@ def fit_measurements(
         robot = replace(robot, noise=replace(robot.noise, walk=NO_WALK))
         found = identify(robot.problem(measurements))
     return assess(settings, robot, measurements, found, measured_noise=measured)
+
+
+def require_own_joints(cell: Cell, measurements: MeasurementSet) -> None:
+    """Require that records have as many joint variables as a cell's robot has joints.
+
+    Raises:
+        UsageError: they have others.
+    """
+    own = cell.settings.mechanism.joint_count
+    for record in measurements.records:
+        if len(record.joints) != own:
+            raise UsageError(
+                f"the records have q1 to q{len(record.joints)}, and the robot has {own} joints",
+                action=f"Give the columns q1 to q{own}, or name the cell of the robot that was measured",
+            )
 
 
 def next_pose(cell: Cell, measurements: MeasurementSet, *, rejections: int = 0) -> NextPose:
@@ -128,6 +147,7 @@ def next_pose(cell: Cell, measurements: MeasurementSet, *, rejections: int = 0) 
         HexacellError: a point is out of reach, the records do not belong to this cell, or no geometry fits
             them.
     """
+    require_own_joints(cell, measurements)
     if len(measurements) > MOST_RECORDS_BEFORE_NEXT:
         raise UsageError(
             f"there are {len(measurements)} records; a next pose is found for {MOST_RECORDS_BEFORE_NEXT}",
@@ -159,6 +179,7 @@ def try_plan(cell: Cell) -> PlanTrial:
         noise_assessment.encoders_part(plan, noise),
         lost_to_speed=lost_to_speed(cell.settings),
         like=like,
+        never_seen=cell.settings.mechanism.words.never_seen,
     )
 
 

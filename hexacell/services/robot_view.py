@@ -10,7 +10,6 @@ from hexacell.drawing.robot_scene import DrawnRobot, robot_scene
 from hexacell.drawing.shapes import Role, Scene
 from hexacell.errors import HexacellError
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.model import Robot, robot_of
@@ -57,7 +56,10 @@ class RobotView:
 
 def drawn_robot(robot: Robot, settings: CellSettings) -> DrawnRobot:
     """A robot with the geometry of its controller, as its cell file mounts the gauges."""
-    low, high = (np.broadcast_to(one, LEGS) for one in (robot.limits.joint_min, robot.limits.joint_max))
+    low, high = (
+        np.broadcast_to(one, robot.mechanism.joint_count)
+        for one in (robot.limits.joint_min, robot.limits.joint_max)
+    )
     x, y, z = (gauge.sign for gauge in sorted(settings.gauges, key=lambda gauge: gauge.axis))
     return DrawnRobot(robot.mechanism, robot.controller, robot.branch, low, high, (x, y, z))
 

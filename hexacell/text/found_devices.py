@@ -8,7 +8,7 @@ import tomlkit
 from drivers.discovery.encoders import BusFindings, FoundFrame, FoundNode
 from drivers.discovery.gauges import PortFindings
 from drivers.serial.opening import SerialPortFound
-from hexacell.kinematics.parameters import LEGS, JointUnit
+from hexacell.kinematics.parameters import CONSTRAINTS, JointUnit
 from hexacell.services.devices import device_search
 from hexacell.services.devices.device_diagnosis import DeviceDiagnosis, Failure
 from hexacell.text.layout import counted
@@ -52,14 +52,16 @@ def cell_text(found: device_search.SearchFindings) -> str:
     if bank := device_search.found_bank(found):
         bus, encoders = bank
         nodes = [node.node for node in encoders]
-        notes.append(f"nodes: those of legs 1 to 6{'' if len(nodes) == LEGS else ': six are needed'}.")
+        notes.append(
+            f"nodes: those of legs 1 to 6{'' if len(nodes) == CONSTRAINTS else ': six are needed'}."
+        )
         document["encoders"] = {"protocol": "cia406", "bus": bus.bus, "nodes": nodes}
         document["encoders"] |= device_search.encoder_keys(encoders)
     elif unknown := next((bus for bus in found.buses if bus.frames), None):  # of no CANopen node
         frames = ", ".join(map(_number, unknown.frames[:MOST_FRAMES]))
         notes.append("encoders.dbc: the file of their maker; a count is no coarser than its steps.")
         notes.append(f"signals: Message.Signal of legs 1 to 6, from the messages among {frames}.")
-        signals = [f"ENC{leg}.Position" for leg in range(1, LEGS + 1)]
+        signals = [f"ENC{leg}.Position" for leg in range(1, CONSTRAINTS + 1)]
         document["encoders"] = {"protocol": "dbc", "bus": unknown.bus, "measuring_step_nm": 1000}
         document["encoders"]["dbc"] = {"file": "encoders.dbc", "signals": signals}
     if (controller := found.controller) is not None:

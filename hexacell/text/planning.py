@@ -20,6 +20,9 @@ from hexacell.verdict.decision import Verdict
 TRYING_PLAN = "Trying the plan on simulated robots within the tolerances, some seconds ..."
 
 
+MOST_NAMED = 6
+"""Parameters that are named; of more it is said that there are others."""
+
 LEAST_LOST = 0.5
 """Minutes that slow moves take which are worth telling."""
 
@@ -91,6 +94,15 @@ def run_forecast_line(forecast: Forecast) -> str:
     return f"{line}; in {minutes} {with_u(forecast.end_mm, unit.number(forecast.end_mm))}"
 
 
+def _unseen_lines(trial: PlanTrial) -> Iterator[str]:
+    """What no record of this robot shows, and what those of the plan do not determine."""
+    if trial.never_seen:
+        yield f"No record of this robot shows {trial.never_seen}."
+    if names := trial.result.undetermined:
+        shown_names = f"{', '.join(names[:MOST_NAMED])}{' and others' if len(names) > MOST_NAMED else ''}"
+        yield f"By the tolerances alone, which U contains: {shown_names}."
+
+
 def plan_trial_lines(trial: PlanTrial) -> Iterator[str]:
     """The outcome expected of a plan, and for which robots it fails."""
     result, target_mm = trial.result, trial.target_mm
@@ -113,6 +125,7 @@ def plan_trial_lines(trial: PlanTrial) -> Iterator[str]:
                 f"The expanded uncertainty U of the largest error there will be about "
                 f"{shown(result.expanded_mm)}, with the systematic effects of [uncertainty]."
             )
+        yield from _unseen_lines(trial)
         yield from _course_lines(result)
         if trial.lost_to_speed >= LEAST_LOST:
             saved = duration(trial.lost_to_speed)

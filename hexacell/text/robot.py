@@ -34,7 +34,7 @@ def robot_picture(view: RobotView) -> tuple[str, str]:
     pose = view.poses[0]
     shown = [one for one in view.measured if one.name != "records"] or view.measured
     scene = robot_scene(view.robot, pose)
-    caption = f"The robot at {pose}: legs 1 to 6, the ball between its gauges x, y and z, the base frame."
+    caption = f"The robot at {pose}: its legs, the ball between its gauges x, y and z, the base frame."
     if shown:
         factor = enlargement((one.vectors for one in shown), view.robot.size(pose))
         for one in shown:

@@ -85,7 +85,7 @@ def _sentence(result: TermResult) -> str:
 def _table(taken: Sequence[TermResult]) -> list[str]:
     if not taken:
         return []
-    lines = [f"  {'':20}" + "".join(f"{f'{leg}':>9}" for leg in range(1, 7))]
+    lines = [f"  {'':20}" + "".join(f"{f'{leg}':>9}" for leg in range(1, len(taken[0].values or ()) + 1))]
     for result in taken:
         unit = _unit(result)
         rows = {f"{result.name}, {unit.name}": result.values, "  +- (one sigma)": result.sigma}

@@ -13,8 +13,8 @@ from functools import partial
 import numpy as np
 
 from hexacell.identification.placement import Placement, RecordPlacement, Weight, leg_forces
-from hexacell.identification.thermal_expansion import UM_PER_M, longer_legs
-from hexacell.kinematics.parameters import LEGS, JointUnit, MachinePart
+from hexacell.identification.thermal_expansion import BASE, UM_PER_M, longer_legs
+from hexacell.kinematics.parameters import JointUnit, MachinePart
 from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effects import THOUSANDTH, Effect, Occurrence
 
@@ -38,7 +38,7 @@ def encoder_scales(um_per_m: float) -> Effect:
     """Each encoder is wrong by a share of its own."""
 
     def columns(at: Placement) -> Array:
-        return at.by_joints(1e-6 * at.joints[..., None] * np.eye(LEGS))
+        return at.by_joints(1e-6 * at.joints[..., None] * at.each_leg)
 
     return Effect("scale of each encoder", um_per_m, "um/m", Occurrence.CONSTANT, columns)
 
@@ -51,7 +51,7 @@ def encoder_eccentricities(mdeg: float) -> Effect:
 
     def waves(at: Placement) -> Array:
         angles = np.radians(at.joints)[..., None]
-        both = np.concatenate([np.cos(angles) * np.eye(LEGS), np.sin(angles) * np.eye(LEGS)], axis=-1)
+        both = np.concatenate([np.cos(angles) * at.each_leg, np.sin(angles) * at.each_leg], axis=-1)
         return at.by_joints(THOUSANDTH * (np.sqrt(0.5) * both))
 
     return Effect("eccentricity of each encoder", mdeg, "mdeg", Occurrence.CONSTANT, waves)
@@ -106,8 +106,8 @@ def command_repeatability(size: float, *, joint: str = "joint", unit: JointUnit 
 
 
 def _by_stops(at: Placement) -> Array:
-    """Errors of the poses (n, 6, 6) by joints that stop a thousandth of their unit beside."""
-    return at.by_joints(np.broadcast_to(THOUSANDTH * np.eye(LEGS), (len(at), LEGS, LEGS)))
+    """Errors of the poses (n, 6, J) by joints that stop a thousandth of their unit beside."""
+    return at.by_joints(np.repeat(THOUSANDTH * at.each_leg[None], len(at), axis=0))
 
 
 def temperature_at_work(kelvin: float, um_per_m_k: Mapping[MachinePart, float]) -> Effect:
@@ -133,7 +133,7 @@ def thermometers_of_legs(kelvin: float, um_per_m_k: float) -> Effect:
 
     def expansion(at: Placement) -> Array:
         progress = np.linspace(-0.5, 0.5, len(at))[:, None, None]
-        return np.asarray(progress * at.by_constraints * longer_legs(at, um_per_m_k)[:, None, :])
+        return np.asarray(progress * at.by_legs(longer_legs(at, um_per_m_k)[..., None] * at.each_leg))
 
     return Effect("thermometers of the legs", kelvin, "K", Occurrence.MEASURING, expansion)
 
@@ -142,9 +142,10 @@ def expansion_coefficients(percent: float, legs_um_m_k: float, base_um_m_k: floa
     """All legs, and the base, expand more than stated by this share of it."""
 
     def expansion(records: RecordPlacement) -> Array:
-        legs, base = legs_um_m_k * records.warmer[:, :LEGS], base_um_m_k * records.warmer[:, LEGS:]
+        warmer = records.warmer[:, : records.joints.shape[1]]
+        legs, base = legs_um_m_k * warmer, base_um_m_k * records.warmer[:, BASE:]
         errors = np.stack([longer_legs(records, legs), longer_legs(records, -base)], axis=-1)
-        return np.asarray(records.by_constraints @ (0.01 * errors))[:, :3]
+        return records.by_legs(0.01 * errors)[:, :3]
 
     name = "coefficients of thermal expansion"
     return Effect(name, percent, "%", Occurrence.MEASURING, on_readings=expansion)
@@ -156,7 +157,7 @@ def load_at_work(newton: float, um_per_n: float) -> Effect:
     def bending(placement: Placement) -> Array:
         # Virtual work: leg forces t hold a force F on the platform if J^T t = F. With A = -J^-1 the legs
         # yield by c t, and the platform by c A A^T F.
-        inverse = placement.by_constraints
+        inverse = placement.by_constraints[..., : placement.joints.shape[1]]
         return np.asarray(THOUSANDTH * um_per_n * inverse @ np.swapaxes(inverse[:, :3], -1, -2))
 
     return Effect("load at work", newton, "N", Occurrence.AT_WORK, bending)
@@ -173,7 +174,8 @@ def own_weight(newton: float, um_per_n: float, weight: Weight) -> Effect:
     """
 
     def yielding(placement: Placement) -> Array:
-        each = THOUSANDTH * um_per_n * placement.by_constraints * leg_forces(placement, weight)[:, None, :]
+        forces = leg_forces(placement, weight)[..., None] * placement.each_leg
+        each = THOUSANDTH * um_per_n * placement.by_legs(forces)
         return np.concatenate([each.sum(axis=-1, keepdims=True), LEGS_DIFFER * each], axis=-1)
 
     return Effect("own weight", newton, "N", Occurrence.CONSTANT, yielding)
@@ -265,17 +267,17 @@ def common_sag(um: float, half_length_mm: float) -> Effect:
         if placement.guides is None:
             return np.zeros((len(placement), 6, 0))
         depth = THOUSANDTH * (placement.guides.along / half_length_mm) ** 2
-        return np.asarray(placement.by_constraints @ (placement.guides.across[..., 1] * depth)[..., None])
+        return placement.by_legs((placement.guides.across[..., 1] * depth)[..., None])
 
     return Effect("sag common to all rails", um, "um", Occurrence.CONSTANT, sagging)
 
 
 def _across_rails(placement: Placement, shapes: Callable[[Array], Array]) -> Array:
-    """Errors by displacements of some shapes (n, 6, m) along the rails, each rail and direction alone."""
+    """Errors by displacements of some shapes (n, J, m) along the rails, each rail and direction alone."""
     if (guides := placement.guides) is None:
         return np.zeros((len(placement), 6, 0))
-    on_rail = np.zeros((6, len(guides.rails)))
+    on_rail = np.zeros((placement.joints.shape[1], len(guides.rails)))
     for rail, legs in enumerate(guides.rails):
         on_rail[list(legs), rail] = 1.0
     columns = np.einsum("nid,nim,ir->nidmr", guides.across, shapes(guides.along), on_rail)
-    return np.asarray(placement.by_constraints @ columns.reshape(len(placement), 6, -1))
+    return placement.by_legs(columns.reshape(*placement.joints.shape, -1))

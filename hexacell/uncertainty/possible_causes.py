@@ -26,7 +26,7 @@ from hexacell.identification.placement import Weight, leg_forces
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.measurement_model import NuisanceElimination
 from hexacell.identification.solver.result import Identification
-from hexacell.kinematics.parameters import LEGS, JointUnit, MachinePart
+from hexacell.kinematics.parameters import JointUnit, MachinePart
 from hexacell.kinematics.rotations import Array, skew
 from hexacell.uncertainty.effect_kinds import (
     ball_roundness,
@@ -128,9 +128,11 @@ def _lost_place(test: ExcessTest) -> Iterator[PossibleCause]:
     problem = test.found.problem
     starts = np.unique(np.linspace(1, problem.records - 1, MOST_STEPS).astype(int))
     later = np.arange(problem.records)[:, None] >= starts
-    columns = np.einsum("nil,nk->nilk", test.found.placement.by_joints(np.eye(LEGS))[:, :3], later)
+    columns = np.einsum(
+        "nil,nk->nilk", test.found.placement.by_joints(np.eye(problem.joints.shape[1])[None])[:, :3], later
+    )
     gain, best = test.largest_gain(columns.reshape(problem.records, 3, -1))
-    significant = chi_square_limit(1, FALSE_STEPS / (LEGS * len(starts)))
+    significant = chi_square_limit(1, FALSE_STEPS / columns[0, 0].size)
     if gain > significant * max(1.0, test.found.noise_test.ratio) ** 2:
         leg, start = divmod(best, len(starts))
         point, orientation = problem.labels[starts[start]].tolist()
@@ -189,13 +191,14 @@ class ExcessTest:
         """Legs that are longer or shorter as the platform's weight pulls or pushes them."""
         placement = self.found.placement
         sides = np.sign(leg_forces(placement, Weight(self.down)))
-        return [(placement.by_constraints * sides[:, None, :])[:, :3]]
+        return [placement.by_legs(sides[..., None] * placement.each_leg)[:, :3]]
 
     def by_encoders(self) -> list[Array]:
         """Encoders whose scale changes along them."""
         joints = self.found.problem.joints
         bent = (joints - joints.mean(axis=0)) ** 2
-        return [self.found.placement.by_joints(bent[..., None] * np.eye(LEGS))[:, :3]]
+        placement = self.found.placement
+        return [placement.by_joints(bent[..., None] * placement.each_leg)[:, :3]]
 
     def by_gauges(self) -> list[Array]:
         """Readings that are a linear function of the deviation, stations turned, and zeros that drift."""
@@ -217,7 +220,8 @@ class ExcessTest:
         changes = [parameters.by_kind(expands) * vector for expands in parts]
         progress = np.linspace(-0.5, 0.5, len(placement))[:, None, None]
         by_parts = placement.by_parameters(np.stack(changes, axis=-1))
-        return [progress * by_parts[:, :3], progress * placement.by_constraints[:, :3]]
+        by_legs = placement.by_constraints[:, :3, : placement.joints.shape[1]]
+        return [progress * by_parts[:, :3], progress * by_legs]
 
     def _at_each_point(self, columns: Array) -> Array:
         """Columns (n, 3, k) as unknowns of each point (n, 3, k m)."""

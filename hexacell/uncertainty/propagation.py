@@ -27,7 +27,7 @@ from hexacell.identification.solver.measurement_model import NuisanceElimination
 from hexacell.identification.solver.result import Identification
 from hexacell.identification.solver.term_estimates import TermEstimates
 from hexacell.identification.terms.term import ErrorsOfSizes, ModelTerm
-from hexacell.kinematics.parameters import LEGS, JointUnit
+from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effect_kinds import COMMON_SCALE, common_encoder_scale
@@ -139,7 +139,7 @@ class Propagation:
         return float(np.sum(by_causes**2) - np.sum(absorbed * (self.found.free_covariance @ absorbed)))
 
     def by_terms(self, terms: TermEstimates) -> Array:
-        """Errors (t, 6, 6 m) at the task poses by one unit of each coefficient of m terms."""
+        """Errors (t, 6, J m) at the task poses by one unit of each coefficient of m terms."""
         return pose_accuracy.errors_by_terms(terms.terms, self.frames, self.task, self.workspace)
 
     def reversals(self, terms: TermEstimates | None) -> Iterator[Effect]:
@@ -153,7 +153,7 @@ class Propagation:
         left = terms.left_by(self.belief.corrections)
         for row, term in enumerate(terms.terms):
             if term.on_either_side is not None:
-                rows = slice(row * LEGS, (row + 1) * LEGS)
+                rows = terms.rows(row)
                 sigma = np.sqrt(np.diag(terms.covariance)[rows])
                 sizes = left[rows] if term.needs_directions else terms.values[rows]
                 yield _at_every_stop(term, term.on_either_side, np.hypot(sizes, sigma))
@@ -169,13 +169,13 @@ class Propagation:
 
 
 def _at_every_stop(term: ModelTerm, on_either_side: ErrorsOfSizes, sizes: Array) -> Effect:
-    """A term of some sizes (6,) where nobody knows the side."""
+    """A term of some sizes (J,) where nobody knows the side."""
     size, unit, at_work = float(np.sqrt(np.mean(sizes**2))), term.unit, Occurrence.STOPS_AT_WORK
     if unit in {*JointUnit}:
         size, unit = size / THOUSANDTH, JointUnit(unit).thousandth
 
     def columns(at: Placement) -> Array:
-        return np.asarray(at.by_constraints @ on_either_side(at, np.zeros_like(at.joints), sizes) / size)
+        return np.asarray(at.by_legs(on_either_side(at, np.zeros_like(at.joints), sizes)) / size)
 
     return Effect(f"{term.name} on either side", size, unit, at_work, columns, source="identified")
 

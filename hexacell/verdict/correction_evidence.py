@@ -30,7 +30,7 @@ def correction_test(robot: Robot, records: MeasurementSet) -> ModelTest | None:
         return None
     bare = robot.mechanism.inverse(*states, records.poses)
     legs, _ = commanded_joints(robot.mechanism, *states, corrections, records.poses)
-    lost = np.array(corrections.backlash)
+    lost = np.array(corrections.backlash[: records.joints.shape[1]])
     wanted = legs - bare + 0.5 * lost * records.directions
     rows = ((records.directions != 0.0) | (lost == 0.0)) & np.isfinite(wanted)
     both = np.where(rows, np.stack([wanted, records.joints - bare]), 0.0)

@@ -267,7 +267,8 @@ class Knowledge:
             robot = replace(robot, noise=noise_of(settings))
         robot = replace(robot, expansion=robot.expansion.referred_to(state.measurements()))
         samples = (one for phase in Phase for one in state.samples(phase))
-        known = known_parts(one.reading.part_temperatures for one in samples)
+        temperatures = (one.reading.part_temperatures for one in samples)
+        known = known_parts(temperatures, self.robot.mechanism.joint_count)
         on_legs = [one.name for one in settings.thermometers if known and one.legs]
         robot = self._at_temperatures(robot, settings, state.temperature_range_k(on_legs), known)
         if noise is None:

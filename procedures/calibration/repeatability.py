@@ -14,7 +14,6 @@ from hexacell.cell.devices import EncoderSettings
 from hexacell.identification.problem.random_walk import NO_WALK, GaugeWalk
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.corrections import CorrectionKind
-from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from hexacell.noise.allowances import Allowances, ReferenceChange, contrasts
@@ -50,8 +49,10 @@ def noise_readings(
     visits = [reading for reading in visits if _is_comparable(reading, allowances)] or visits[:1]
     return NoiseReadings(
         reference=reference,
-        series=np.concatenate([np.reshape(gauges, (-1, 3)), np.reshape(joints, (-1, 6))], axis=1),
-        steps=np.array([*steps, *(encoders.step,) * 6]),
+        series=np.concatenate(
+            [np.reshape(gauges, (-1, 3)), np.reshape(joints, (-1, len(zero.reading.joints)))], axis=1
+        ),
+        steps=np.array([*steps, *(encoders.step,) * len(zero.reading.joints)]),
         visits=np.array([_gauges_and_joints(reading, reference, allowances) for reading in visits]),
         window_readings=len(visits[0].counts),
     )
@@ -73,7 +74,7 @@ def _gauges_and_joints(reading: Reading, reference: Pose, allowances: Allowances
     gauges, joints = np.array(reading.gauges_mm), np.array(reading.joints)
     if reading.directions:
         directions = np.array(reading.directions)
-        further = 0.5 * np.array(allowances.robot.corrections.backlash) * directions
+        further = 0.5 * np.array(allowances.robot.corrections.backlash[: len(directions)]) * directions
         joints = joints - further
         if allowances.terms is not None:
             beside = allowances.terms.beside_encoders(directions)
@@ -101,8 +102,8 @@ def readings_between(before: Reading, after: Reading, counted: float, walk: Gaug
 def _on_unknown_sides(reading: Reading, allowances: Allowances) -> Array:
     """How far joints (6,) may be beside their encoders by backlash that is known, on an unknown side."""
     if allowances.terms is None:
-        return np.zeros(LEGS)
-    is_unknown = np.array(reading.directions or (0,) * LEGS) == 0
+        return np.zeros(len(reading.joints))
+    is_unknown = np.array(reading.directions or (0,) * len(reading.joints)) == 0
     return np.abs(allowances.terms.beside_encoders(is_unknown))
 
 
@@ -198,9 +199,11 @@ def reversal_by_repeats(plan: Plan, state: RunState, found: Identification) -> R
         reference = Pose(*one.samples[0].pose)
         before = np.array([0.0, 0.0, 0.0, *one.samples[0].reading.joints])
         visits += [
-            (allowances.since(reference, before, before + row[:9]), row[9:]) for row in contrasts(rows)
+            (allowances.since(reference, before, before + row[: len(before)]), row[len(before) :])
+            for row in contrasts(rows)
         ]
     stated, unit = plan.settings.model.backlash, plan.settings.mechanism.words.joint_unit
     if found.terms is not None and BACKLASH in {term.name for term in found.terms.terms}:
         return reversal_of(visits, *found.terms.of(BACKLASH), unit)
-    return reversal_of(visits, np.zeros(LEGS), np.full(LEGS, stated), unit)
+    legs = plan.settings.mechanism.joint_count
+    return reversal_of(visits, np.zeros(legs), np.full(legs, stated), unit)

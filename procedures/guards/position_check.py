@@ -30,7 +30,7 @@ from hexacell.clock import CellClock
 from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import CurrentConfig
 from hexacell.identification.terms.corrected_joints import commanded_joints
-from hexacell.kinematics.mechanism import Mechanism, joint_zeros
+from hexacell.kinematics.mechanism import Mechanism, completed_pose, joint_zeros
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from procedures.devices.device_set import Devices
@@ -103,7 +103,7 @@ def position_mismatch(
     excess = from_encoders
     if reports.joints is not None:
         from_joints = _excess(by_pose - reports.joints, rounding)
-        between = _excess(reports.joints - reports.encoders, np.full(6, following))
+        between = _excess(reports.joints - reports.encoders, np.full_like(reports.encoders, following))
         if _agree(from_joints):
             odd, excess = PositionSource.ENCODERS, between
         elif _agree(between):
@@ -132,7 +132,8 @@ def _joints_of(
     [joints], [unknown] = commanded_joints(mechanism, *states, poses)
     derivatives = mechanism.derivatives(config.geometry, poses, np.nan_to_num(joints)[None])
     with np.errstate(divide="ignore", invalid="ignore"):
-        slopes = np.linalg.norm(derivatives.pose[0, :, :3], axis=-1) / np.abs(derivatives.joints[0])
+        by_legs = derivatives.pose[0, : len(joints), :3]
+        slopes = np.linalg.norm(by_legs, axis=-1) / np.abs(derivatives.joints[0])
     rounding = position_mm * np.maximum(1.0, np.nan_to_num(slopes, nan=1.0, posinf=1.0))
     return joints, rounding + unknown
 
@@ -197,7 +198,7 @@ class PositionCheck:
         joints = None if reported.joints is None else np.array(reported.joints)
         if joints is not None and self.settings.controller.joints_include_zeros:
             joints = joints - joint_zeros(mechanism, commanding.geometry)
-        reports = PositionReports(reported.pose, joints, np.array(encoders.positions))
+        reports = PositionReports(self.completed(reported.pose), joints, np.array(encoders.positions))
         mismatch = position_mismatch(
             mechanism,
             commanding,
@@ -208,6 +209,11 @@ class PositionCheck:
         if mismatch is None:
             return CheckedPosition(reports)
         return CheckedPosition(reports, self._trip(mismatch, reports, following), mismatch.odd)
+
+    def completed(self, pose: Pose) -> Pose:
+        """A pose as the controller reports it, with those angles that the robot does not have."""
+        geometry = self.config.geometry().geometry
+        return completed_pose(self.settings.mechanism, geometry, pose)
 
     def _trip(self, found: PositionMismatch, reports: PositionReports, following: float) -> Trip:
         joint = f"{self.settings.mechanism.words.joint} {found.leg}"

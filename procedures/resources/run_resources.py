@@ -128,7 +128,8 @@ class RunResources:
 
     def _is_at(self, here: Pose, target: SixNumbers) -> bool:
         """Whether a reported pose is a commanded one; each may be off by the tolerance of an arrival."""
-        there, settings = Pose(*target), self.settings.controller
+        here, there = self.guards.position.completed(here), self.guards.position.completed(Pose(*target))
+        settings = self.settings.controller
         position = np.abs(here.position - there.position).max()
         angle = np.degrees(np.abs(here.rotation - there.rotation).max())
         is_near = position <= 2.0 * settings.position_tolerance_mm

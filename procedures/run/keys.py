@@ -7,7 +7,7 @@ from pydantic import AfterValidator
 
 from hexacell.campaign.pilots import pilot_number
 from hexacell.cell.fields import Frozen
-from hexacell.kinematics.parameters import LEGS
+from hexacell.measurements.csv_file import FEWEST_JOINTS, MOST_JOINTS
 from hexacell.measurements.records import Directions
 
 SixNumbers = tuple[float, float, float, float, float, float]
@@ -15,8 +15,9 @@ ThreeNumbers = tuple[float, float, float]
 
 
 def _of_joints(directions: Directions) -> Directions:
-    if directions and (len(directions) != LEGS or not {-1, 0, 1}.issuperset(directions)):
-        raise ValueError("must be six of 1, -1 and 0, or none")
+    is_of_all = FEWEST_JOINTS <= len(directions) <= MOST_JOINTS
+    if directions and not (is_of_all and {-1, 0, 1}.issuperset(directions)):
+        raise ValueError("must be 1, -1 or 0 for each joint, or none")
     return directions
 
 

@@ -5,10 +5,15 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from hexacell.cell.devices import ThermometerSettings
-from hexacell.cell.fields import Frozen
-from hexacell.kinematics.parameters import LEGS
-from hexacell.measurements.records import Deviation, Temperatures, deviation_of, temperatures_of
-from procedures.run.keys import ArrivalDirections, SixNumbers, ThreeNumbers
+from hexacell.cell.fields import Frozen, JointNumbers
+from hexacell.measurements.records import (
+    MEASURED_PARTS,
+    Deviation,
+    Temperatures,
+    deviation_of,
+    temperatures_of,
+)
+from procedures.run.keys import ArrivalDirections, ThreeNumbers
 
 
 class Temperature(Frozen):
@@ -43,7 +48,7 @@ class Reading(RawReadings):
 
     gauges_mm: ThreeNumbers
     spread_mm: ThreeNumbers
-    joints: SixNumbers
+    joints: JointNumbers
     temperatures: tuple[Temperature, ...] = ()
     directions: ArrivalDirections = ()
     part_temperatures: Temperatures = ()
@@ -61,7 +66,7 @@ class ReadingSeries(RawReadings):
     """
 
     gauges_mm: tuple[ThreeNumbers, ...]
-    joints: tuple[SixNumbers, ...]
+    joints: tuple[JointNumbers, ...]
 
 
 def in_words(deviation_mm: Iterable[float]) -> str:
@@ -73,7 +78,7 @@ def on_parts(thermometers: Iterable[ThermometerSettings], shown: Iterable[Temper
     """The temperatures of legs and base by what thermometers showed; empty if none on one did."""
     celsius = {one.name: one.celsius for one in shown}
     placed = {place: celsius.get(one.name) for one in thermometers for place in (*one.legs, one.part)}
-    found = tuple(placed.get(place) for place in (*range(1, LEGS + 1), "base"))
+    found = tuple(placed.get(place) for place in (*range(1, MEASURED_PARTS), "base"))
     return found if any(one is not None for one in found) else ()
 
 
@@ -82,7 +87,7 @@ def mean_leg_temperatures(
 ) -> tuple[float | None, ...]:
     """The mean temperature of each leg, deg C; None of a leg that has no thermometer, or a silent one."""
     shown = temperatures_of(on_parts(thermometers, reading.temperatures) for reading in readings)
-    columns = (column[np.isfinite(column)] for column in shown.T[:LEGS])
+    columns = (column[np.isfinite(column)] for column in shown.T[: MEASURED_PARTS - 1])
     return tuple(float(column.mean()) if len(column) else None for column in columns)
 
 

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from typing import ClassVar, Literal
 
+from hexacell.cell.fields import JointNumbers
 from hexacell.measurements.records import joints_of
 from procedures.resources.run_resources import RunResources
 from procedures.run.keys import SixNumbers
@@ -18,8 +19,8 @@ class Located(BaseEvent):
 
     kind: Literal["located"] = "located"
     pose: SixNumbers
-    joints: SixNumbers | None
-    encoders: SixNumbers
+    joints: JointNumbers | None
+    encoders: JointNumbers
 
     def applied_to(self, state: RunState) -> RunState:
         """The robot is at a pose of no set, and from which side its joints arrived is not known."""

@@ -23,7 +23,7 @@ from tests.benchmarks.tolerance_bound import largest_chances
 from tests.benchmarks.virtual_calibration import Judged, by_derivatives, judged, robot_that_stands
 
 ROBOTS = sample(__name__, "ROBOTS")
-CELLS = ("simulated-hexaglide", "gough-stewart", "linapod", "rotary-cranks")
+CELLS = ("simulated-hexaglide", "gough-stewart", "linapod", "rotary-cranks", "five-legs", "four-arms")
 FAULTY = sample(__name__, "FAULTY")
 """Robots with one joint out by twice its tolerance."""
 ALLOWANCE = 1.5 / FAULTY

@@ -52,7 +52,8 @@ def test_paper_experiment_is_tables_3_and_4():
 
 
 PUBLISHED = ["camera-hexapod", "wpi-hexapod"]
-OTHERS = ["gough-stewart", "linapod", "rotary-cranks", "linuxcnc-hexapod/cell", *PUBLISHED]
+FEWER_JOINTS = ["five-legs", "four-arms"]
+OTHERS = ["gough-stewart", "linapod", "rotary-cranks", "linuxcnc-hexapod/cell", *PUBLISHED, *FEWER_JOINTS]
 NAMES = [*OTHERS, "simulated-hexaglide", "worn-hexaglide", "paper-experiment"]
 NOT_THEIRS = re.compile(r"\b(slider|rail|hexaglide)", re.IGNORECASE)
 

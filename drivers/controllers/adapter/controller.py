@@ -8,10 +8,10 @@ from typing import TypeVar, cast
 
 from drivers import errors, interfaces
 from drivers.controllers.adapter.link import Link, Timeouts
-from drivers.controllers.adapter.messages import Failed, Nothing, Position, Status, pose_of
+from drivers.controllers.adapter.messages import Failed, Nothing, Position, Status
 from drivers.controllers.adapter.options import AdapterOptions, Program
 from drivers.controllers.adapter.session import Session
-from drivers.controllers.poses import agree, aside, require_unmoved
+from drivers.controllers.poses import agree, aside, from_wire, on_wire, require_unmoved
 from drivers.controllers.reload_command import run_reload_command
 from drivers.interfaces import StartupAction
 from drivers.wire_trace import TraceRecorder
@@ -117,10 +117,10 @@ class AdapterController:
         found = await self._position(self._session.connected())
         if found.pose is None:
             return None
-        return interfaces.ReportedPosition(pose_of(found.pose), _joints(found))
+        return interfaces.ReportedPosition(self._pose(found.pose), _joints(found))
 
     async def joints_now(self) -> tuple[float, ...] | None:
-        """The six joints, also during ``move``; None where it does not know them."""
+        """The joints, also during ``move``; None where it does not know them."""
         return _joints(await self._position(self._session.connected()))
 
     async def status(self) -> interfaces.ControllerStatus:
@@ -193,7 +193,18 @@ class AdapterController:
         return status
 
     async def _position(self, link: Link) -> Position:
-        return self._done(await link.ask("position", Position), "position")
+        found, own = (
+            self._done(await link.ask("position", Position), "position"),
+            self._settings.coordinates,
+        )
+        for what, numbers in (("coordinates", found.pose), ("joints", found.joints)):
+            if numbers is not None and len(numbers) != len(own):
+                raise DeviceError(
+                    f"reports {len(numbers)} {what}, and the robot has {len(own)}: {own}",
+                    subject=self._name,
+                    action="Correct its program, or robot.mechanism in the cell file",
+                )
+        return found
 
     def _done(self, answer: AnswerT | Failed, do: str) -> AnswerT:
         if not isinstance(answer, Failed):
@@ -265,7 +276,7 @@ class AdapterController:
         # With other zeros it reports other joints where it stands: encoders then show whether it moved.
         if before is not None and joints is not None and not self._settings.joints_include_zeros:
             require_unmoved(before, joints, self._settings.position_tolerance_mm, self._name)
-        self._joints_before_reload, self._here = None, pose_of(found.pose)
+        self._joints_before_reload, self._here = None, self._pose(found.pose)
 
     def _is_later_estop(self, status: Status) -> bool:
         """Whether it was not in this emergency stop when it was started."""
@@ -291,8 +302,8 @@ class AdapterController:
                 "move",
                 Nothing,
                 limit_s,
-                {"pose": list(pose.as_tuple()), "duration_s": duration_s},
-                lambda at: aside(start, at, pose),
+                {"pose": on_wire(pose, self._settings.coordinates), "duration_s": duration_s},
+                lambda at: self._aside(start, at, pose),
             )
         except TimeoutError:
             await self.stop()
@@ -315,10 +326,10 @@ class AdapterController:
         """Where it stands before a move: where the last one left it."""
         here = (await self._position(link)).pose
         if here is not None and (
-            self._here is None or agree(pose_of(here), self._here, self._settings, _LEFT_TOLERANCES)
+            self._here is None or agree(self._pose(here), self._here, self._settings, _LEFT_TOLERANCES)
         ):
-            return pose_of(here)
-        where = "nowhere" if here is None else f"at {pose_of(here)}"
+            return self._pose(here)
+        where = "nowhere" if here is None else f"at {self._pose(here)}"
         raise errors.MotionInterrupted(
             f"is {where}, and was left at {self._here}: it moved without a command",
             subject=self._name,
@@ -344,7 +355,7 @@ class AdapterController:
         was_stopped = self._stop_count != stops and failed.kind == "interrupted"
         await self.stop()
         there = (await self._position(self._session.connected())).pose
-        where = "" if there is None else f" at {pose_of(there)}"
+        where = "" if there is None else f" at {self._pose(there)}"
         if was_stopped:
             self._unready = ""
         raise errors.MotionInterrupted(
@@ -358,7 +369,7 @@ class AdapterController:
         deadline = _now() + self._timeouts.arrival
         while True:
             status, found = await self._status(link), await self._position(link)
-            there = None if found.pose is None else pose_of(found.pose)
+            there = None if found.pose is None else self._pose(found.pose)
             if not status.moving and there is not None and agree(there, pose, self._settings):
                 return
             if status.moving or _now() > deadline:
@@ -385,6 +396,16 @@ class AdapterController:
             if _now() > deadline:
                 link.fail(f"still moves {limit_s:g} s after the stop command")
                 link.require_sound()
+
+    def _aside(self, start: Pose, at: list[float], target: Pose) -> str | None:
+        """What is wrong with where it says that it is on its way, if anything is."""
+        if len(at) != len(self._settings.coordinates):
+            return f"says that it is at {at}, and the robot has {self._settings.coordinates}"
+        return aside(start, self._pose(at), target)
+
+    def _pose(self, numbers: list[float]) -> Pose:
+        """The pose of the coordinates that the robot has."""
+        return from_wire(numbers, self._settings.coordinates)
 
     def _refused(self, pose: Pose, reason: str, action: str | None = None) -> errors.MoveRefused:
         return errors.MoveRefused(f"to move to {pose}", reason, subject=self._name, action=action)

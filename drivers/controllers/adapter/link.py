@@ -18,7 +18,7 @@ from pydantic import ValidationError
 
 from drivers.controllers.adapter.local_program import LocalProgram
 from drivers.controllers.adapter.masking import Masking, revealed
-from drivers.controllers.adapter.messages import LONGEST_LINE, Answer, Failed, Hello, Message, pose_of
+from drivers.controllers.adapter.messages import LONGEST_LINE, Answer, Failed, Hello, Message
 from drivers.controllers.adapter.options import Program
 from drivers.controllers.adapter.program_process import ProgramProcess
 from drivers.controllers.adapter.served_robot import VERSION
@@ -27,7 +27,6 @@ from drivers.wire_trace import LineRecord, TraceRecorder, TrafficDirection
 from hexacell.cell.fields import first_mistake
 from hexacell.clock import Patience
 from hexacell.errors import DeviceError, UsageError
-from hexacell.kinematics.pose import Pose
 
 AnswerT = TypeVar("AnswerT", bound=Message)
 
@@ -61,7 +60,7 @@ class Request(Generic[AnswerT]):
 
     do: str
     kind: type[AnswerT]
-    on_way: Callable[[Pose], str | None]
+    on_way: Callable[[list[float]], str | None]
     answer: asyncio.Future[AnswerT | Failed | None] = field(
         default_factory=lambda: asyncio.get_running_loop().create_future()
     )
@@ -124,7 +123,9 @@ class Link:
         kind: type[AnswerT],
         timeout_s: float | None = None,
         arguments: Mapping[str, object] = MappingProxyType({}),
-        on_way: Callable[[Pose], str | None] = lambda at: f"says that it is at {at}, and was not to move",
+        on_way: Callable[[list[float]], str | None] = lambda at: (
+            f"says that it is at {at}, and was not to move"
+        ),
     ) -> AnswerT | Failed:
         """Ask, and give the answer. ``on_way`` says what is wrong with a pose on the way, if anything is.
 
@@ -285,7 +286,7 @@ class Link:
                 return f"is on its way after it said that request {answer.id} was over: {_shown(line)}"
             return f"answers request {answer.id}, which was answered before or never asked: {_shown(line)}"
         if answer.at is not None:
-            return request.on_way(pose_of(answer.at))
+            return request.on_way(answer.at)
         found: Message | None = answer.failed
         if answer.done is not None:
             try:

@@ -5,14 +5,13 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from hexacell.cell.fields import LONGEST_TEXT, InRange
-from hexacell.kinematics.pose import Pose
 from hexacell.printable import printable
 
 LONGEST_LINE = 65_536
 """Longest message, bytes."""
 MOST_ERRORS = 10
 
-Coordinates = Annotated[list[InRange], Field(min_length=6, max_length=6)]
+Coordinates = Annotated[list[InRange], Field(min_length=4, max_length=6)]
 Told = Annotated[str, AfterValidator(lambda text: printable(text[:LONGEST_TEXT]))]
 """A text of the program, in one printable piece."""
 
@@ -82,9 +81,3 @@ class Answer(Message):
         if len(self.model_fields_set) != 2 or (self.at, self.done, self.failed) == (None,) * 3:
             raise ValueError("it is not one of at, done and failed")
         return self
-
-
-def pose_of(coordinates: list[float]) -> Pose:
-    """The pose of six numbers."""
-    x, y, z, a, b, c = coordinates
-    return Pose(x, y, z, a, b, c)

@@ -10,6 +10,7 @@ from drivers.interfaces import DeviceIdentity
 from drivers.wire_trace import TraceRecorder
 from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError
+from hexacell.kinematics.pose import AXES
 
 
 class Session:
@@ -27,6 +28,8 @@ class Session:
         self._on_replaced = on_replaced
         port = settings.port
         self._told: dict[str, object] = {"host": settings.host, **({} if port is None else {"port": port})}
+        if settings.coordinates != AXES:
+            self._told["coordinates"] = settings.coordinates
         self._is_open = False
         self._link: Link | None = None
         self._identity: DeviceIdentity | None = None

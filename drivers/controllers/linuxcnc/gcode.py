@@ -19,8 +19,8 @@ _UNREACHABLE = re.compile(
 )
 
 
-def timed_move(pose: Sequence[float], duration_s: float) -> str:
-    """The block that moves to x, y, z, mm, a, b, c, deg, in inverse time: F is 1 / duration, in 1/min.
+def timed_move(pose: Sequence[float], duration_s: float, coordinates: str = "xyzabc") -> str:
+    """The block that moves to some coordinates, mm and deg, in inverse time: F is 1 / duration, in 1/min.
 
     In millimetres (G21), and in machine coordinates (G53): no query shows that the coordinate system is
     rotated (G10 L2 R). It has more decimals than the six of reported positions. A feed rate (G94) would
@@ -32,7 +32,9 @@ def timed_move(pose: Sequence[float], duration_s: float) -> str:
     """
     if not all(map(math.isfinite, pose)):
         raise ValueError("a coordinate is not a finite number")
-    words = " ".join(f"{axis}{value:.{_DECIMALS}f}" for axis, value in zip("XYZABC", pose, strict=True))
+    words = " ".join(
+        f"{axis}{value:.{_DECIMALS}f}" for axis, value in zip(coordinates.upper(), pose, strict=True)
+    )
     return f"G21 G53 G93 G1 {words} F{60.0 / duration_s:.{_DECIMALS}f}"
 
 

@@ -23,6 +23,7 @@ from drivers.controllers.linuxcnc.access import (
     require_own_coordinates,
 )
 
+_AXES = "xyzabc"
 REPORT_S = 0.05
 SWITCH_S, REST_S, MESSAGE_S = 5.0, 2.0, 0.2
 MOST_REQUESTS, MOST_MESSAGES, MOST_SHOWN = 2, 100, 4
@@ -38,9 +39,11 @@ class Machine:
         self._shown: list[str] = []
         self._restoring = ""
         self._is_connected = self._is_ours = False
+        self._coordinates = _AXES
 
     def hello(self, told: Told) -> Told:
         """Connect; older messages are none of this client's."""
+        self._coordinates = told.get("coordinates", _AXES)
         found = self._access.connect(told)
         self._is_connected = True
         self._take_messages()
@@ -72,7 +75,8 @@ class Machine:
         state = self._access.state()
         if not state.is_homed:
             return {"pose": None, "joints": None}
-        return {"pose": list(state.pose), "joints": list(state.joints)}
+        joints = list(state.joints)[: len(self._coordinates)]
+        return {"pose": self._own(state.pose), "joints": joints}
 
     def start_up(self, action: str) -> None:
         """Do it, and wait until it is so; ``check`` takes control, and requires its own coordinates."""
@@ -107,15 +111,26 @@ class Machine:
             self._enter_mdi_mode()
         self._take_messages()
         self._restoring = self._restoring or gcode.restoring_block(state.codes)
-        self._access.begin(gcode.timed_move(pose, duration_s))
+        self._access.begin(gcode.timed_move(pose, duration_s, self._coordinates))
         try:
-            state = self._until(lambda now: self._access.is_over(now, pose), report)
-            if not state.is_at(pose):
+            state = self._until(lambda now: self._access.is_over(now, self._whole(pose, now)), report)
+            if not state.is_at(self._whole(pose, state)):
                 raise self._failure(state)
         finally:
             with suppress(FailedError):  # what is not restored now is restored after a later move
                 self._restore_modes()
         self._is_ours = True
+
+    def _own(self, pose: Sequence[float]) -> list[float]:
+        """Those coordinates of a pose that the robot has."""
+        return [value for axis, value in zip(_AXES, pose, strict=True) if axis in self._coordinates]
+
+    def _whole(self, coordinates: Sequence[float], state: State) -> list[float]:
+        """All coordinates of a pose: those that the robot does not have are as they are."""
+        if self._coordinates == _AXES:
+            return list(coordinates)
+        given = dict(zip(self._coordinates, coordinates, strict=True))
+        return [given.get(axis, value) for axis, value in zip(_AXES, state.pose, strict=True)]
 
     def stop(self) -> None:
         """Abort what goes on; returns at rest."""
@@ -168,7 +183,7 @@ class Machine:
                 raise self._failure(state)
             if report is not None and time.monotonic() > reported + REPORT_S:
                 reported = time.monotonic()
-                report(list(state.pose))
+                report(self._own(state.pose))
             time.sleep(self._access.poll_s)
         return state
 

@@ -238,8 +238,9 @@ class ShellAccess:
         return True
 
     def joints_in(self, text: str) -> tuple[float, ...]:
-        """The six joints of an answer, mm or deg."""
-        return tuple(self.settings.joint_unit_mm * value for value in parse_positions(text))
+        """The joints of an answer, mm or deg."""
+        found = parse_positions(text, len(self.settings.coordinates))
+        return tuple(self.settings.joint_unit_mm * value for value in found)
 
     def _is_near(self, one: Sequence[float], other: Sequence[float]) -> bool:
         apart = (abs(a - b) for a, b in zip(one, other, strict=True))

@@ -11,7 +11,6 @@ import math
 from dataclasses import dataclass
 
 from drivers.controllers.adapter.served_robot import FailedError
-from hexacell.kinematics.parameters import LEGS
 
 MAX_LINE_BYTES = 255
 """Longest command with its line end; a longer one overruns the buffer of LinuxCNC 2.9."""
@@ -113,19 +112,21 @@ def parse_response(line: str, command: str) -> Response | None:
     return None
 
 
-def parse_positions(text: str) -> tuple[float, float, float, float, float, float]:
-    """The first six numbers of an answer: joints 1 to 6, mm, or a pose's coordinates.
+def parse_positions(text: str, count: int = 6) -> tuple[float, ...]:
+    """The first numbers of an answer: a pose's coordinates, or joints, mm or deg.
 
     Raises:
-        FailedError: There are fewer than six, or one of them is no finite number.
+        FailedError: There are fewer, or one of them is no finite number.
     """
     try:
-        x, y, z, a, b, c = (float(word) + 0.0 for word in text.split()[:LEGS])  # -0.0 becomes 0.0
-    except ValueError as error:
-        raise FailedError("fault", f"it reports {text!r} where six positions belong") from error
-    if not all(math.isfinite(value) for value in (x, y, z, a, b, c)):
+        found = tuple(float(word) + 0.0 for word in text.split()[:count])  # -0.0 becomes 0.0
+    except ValueError:
+        found = ()
+    if len(found) < count:
+        raise FailedError("fault", f"it reports {text!r} where {count} positions belong")
+    if not all(map(math.isfinite, found)):
         raise FailedError("fault", f"it reports {text!r}, which is no position")
-    return x, y, z, a, b, c
+    return found
 
 
 def parse_number(text: str) -> float:

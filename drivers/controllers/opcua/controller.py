@@ -7,6 +7,8 @@ from drivers.controllers.adapter.options import Program
 from drivers.controllers.opcua.options import OpcUaOptions
 from drivers.errors import optional
 from hexacell.cell.robot import ControllerOptions, ControllerSettings
+from hexacell.errors import UsageError
+from hexacell.kinematics.pose import AXES
 from hexacell.python_process import python_command
 
 
@@ -19,5 +21,8 @@ class OpcUaController(AdapterController):
         options = cast("OpcUaOptions", settings.options)
         name, told = f"controller {options.endpoint}", options.model_dump(mode="json")
         optional("asyncua", "opcua", name)
+        if settings.coordinates != AXES:
+            action = "Use another protocol, as adapter"
+            raise UsageError(f"a PLC takes {AXES}, and the robot has {settings.coordinates}", action=action)
         command = python_command("drivers.controllers.opcua.program")
         super().__init__(settings, Program(name, command, settings=told, protocol="opcua"), **named)

@@ -1,5 +1,6 @@
 """The simulated encoders on a virtual CAN bus: CANopen nodes, and those that a DBC file describes."""
 
+import itertools
 import uuid
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -72,14 +73,14 @@ class SimulatedEncoderBank(_CanBank):
         step = round(settings.step / NM)
         if isinstance(settings, RotaryEncoderSettings):
             step = settings.counts_per_turn
-        serial_numbers = settings.serial_numbers or range(FIRST_SERIAL_NUMBER, FIRST_SERIAL_NUMBER + 6)
+        serial_numbers = settings.serial_numbers or itertools.count(FIRST_SERIAL_NUMBER)
         devices = (
             DeviceData(node, serial_number, step, settings.signed)
-            for node, serial_number in zip(settings.nodes, serial_numbers, strict=True)
+            for node, serial_number in zip(settings.nodes, serial_numbers, strict=False)
         )
         self._encoders = tuple(
             SimulatedEncoder(self.bus, vendor, device, clock.real_seconds)
-            for vendor, device in zip(vendors or (usual,) * 6, devices, strict=True)
+            for vendor, device in zip(vendors or itertools.repeat(usual), devices, strict=False)
         )
         with self.bus.lock:
             self._sample()

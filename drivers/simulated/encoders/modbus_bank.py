@@ -46,7 +46,7 @@ class ModbusScales(Instrument):
         super().__init__({})
         self._described, self._counts = described, counts
         self._latched: Sequence[int] | None = None
-        self.scales = tuple(_Scale() for _ in range(6))
+        self.scales = tuple(_Scale() for _ in described.registers)
 
     def split(self, received: bytes) -> tuple[list[bytes], bytes]:
         return split_requests(received)

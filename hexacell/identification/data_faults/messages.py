@@ -66,7 +66,7 @@ def _rejected_record(test: DeletionTest) -> DataFault:
             f"q{leg} is {shown(off, '+')} off its place for the commanded pose, unlike in the point's "
             "other records; the record is left out"
         )
-        action = "Check whether q1 to q6 belong to another pose, or measure it again"
+        action = "Check whether its joint variables belong to another pose, or measure it again"
     elif test.offset_mm is None:
         fact = "the pose is too near a singularity for this record to be used"
         action = "Choose another orientation"

@@ -17,7 +17,6 @@ from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.frame_alignment import FrameFit, PoseErrors, pose_errors
 from hexacell.identification.placement import Placement
 from hexacell.identification.terms.term import ModelTerm
-from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import free_sensitivity
@@ -95,7 +94,7 @@ def errors_by_terms(
 
     Those of a term that acts by the direction of arrival, which is another at each stop, are zero.
     """
-    found = np.zeros((len(task), 6, len(terms), LEGS))
+    found = np.zeros((len(task), 6, len(terms), task.joints.shape[1]))
     for row, term in enumerate(terms):
         if not term.needs_directions:
             at_task, over = (term.pose_errors(at, np.zeros_like(at.joints)) for at in (task, workspace))

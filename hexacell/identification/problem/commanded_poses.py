@@ -20,7 +20,6 @@ from hexacell.identification.problem.prior import Prior
 from hexacell.kinematics.forward import CONTINUATION_STAGES, ForwardResult, continue_solution
 from hexacell.kinematics.geometry import Geometries, Geometry, GeometryBatch
 from hexacell.kinematics.mechanism import Branch, Mechanism
-from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import FrameTransform, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 
@@ -195,7 +194,7 @@ def _explained_by_tolerances(commands: CommandedPoses, prior: Prior) -> Array:
     parameters = prior.centre.parameters
 
     def commanded(change: Array) -> Array:
-        geometry = Geometry(parameters, prior.centre.vector + parameters.of_every_leg(change))
+        geometry = Geometry(parameters, prior.centre.vector + parameters.of_every_row(change))
         return commands.mechanism.inverse(geometry, commands.branch, commands.poses)
 
     at_drawing = commanded(np.zeros(len(widths)))
@@ -215,8 +214,9 @@ def _advice(commands: CommandedPoses, measured: Array, explained: Array) -> str:
     columns = linear_sum_assignment(np.median(distance, axis=0))[1].tolist()
     difference = np.nan_to_num(np.abs(measured[:, columns] - commands.joints), nan=0.0)
     if not _is_small_share(difference > explained):
-        return "Check that q1 to q6 are in the row of their pose, in mm, and which config commanded it"
-    moved = [leg for leg in range(LEGS) if columns[leg] != leg]
+        where = f"q1 to q{len(columns)} are in the row of their pose, in mm"
+        return f"Check that {where}, and which config commanded it"
+    moved = [leg for leg, column in enumerate(columns) if column != leg]
     names = ", ".join(f"q{leg + 1}" for leg in moved)
     sources = ", ".join(f"q{columns[leg] + 1}" for leg in moved)
     joint = commands.mechanism.words.joint

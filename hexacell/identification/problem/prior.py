@@ -18,7 +18,7 @@ from hexacell.identification.placement import RecordPlacement
 from hexacell.identification.problem.random_walk import NO_WALK, GaugeWalk
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism, free_parameter_derivatives
-from hexacell.kinematics.parameters import LEGS, ParameterSet, ParameterUnit
+from hexacell.kinematics.parameters import CONSTRAINTS, ParameterSet, ParameterUnit
 from hexacell.kinematics.rotations import Array
 
 
@@ -36,6 +36,7 @@ class Noise:
         stops: of where a joint stops beside its command, as its encoder shows it: no noise of a record, but
             it moves the ball.
         walk: of the gauges' zero.
+        joint_count: how many encoders there are.
         freedom: degrees of freedom with which all this was measured; infinite where it is stated.
         gauge_axes: rows of the matrix whose columns are the gauges' directions in the frame convention;
             empty where all gauges are alike, or along its axes.
@@ -51,6 +52,7 @@ class Noise:
     stops: float = 0.0
     walk: GaugeWalk = NO_WALK
     freedom: float = np.inf
+    joint_count: int = CONSTRAINTS
 
     def with_devices(self, encoders: Sequence[float], gauges_mm: Sequence[float]) -> Noise:
         """This noise with that of each encoder, and of the gauges x, y and z."""
@@ -75,8 +77,8 @@ class Noise:
 
     @property
     def encoders(self) -> Array:
-        """Standard deviation of each encoder (6,), in its unit."""
-        return self.encoder * np.array(self.encoder_shares or (1.0,) * LEGS)
+        """Standard deviation of each encoder (J,), in its unit."""
+        return self.encoder * np.array(self.encoder_shares or (1.0,) * self.joint_count)
 
     @property
     def gauges_mm(self) -> Array:
@@ -204,7 +206,7 @@ class Prior:
         parameters, widths = mechanism.parameters, np.zeros(len(mechanism.parameters))
         widths[mechanism.convention.free_rows] = np.sqrt(3.0 * np.diag(self.covariance))
         largest = [parameters.array(widths, kind.symbol).max() for kind in parameters.kinds]
-        return np.repeat(largest, [kind.numbers_per_leg for kind in parameters.kinds])
+        return np.repeat(largest, [kind.numbers_per_row for kind in parameters.kinds])
 
 
 @dataclass(frozen=True, eq=False)

@@ -366,5 +366,5 @@ def _require_start_poses(found: Mask, labels: NDArray[np.int_]) -> None:
     raise IdentifiabilityError(
         f"in {len(missing)} of {len(found)} records a singularity lies between the commanded pose and the "
         f"joint variables; the first is point {point}, orientation {orientation}",
-        action="Check that q1 to q6 belong to these poses, and the poses to this controller's config",
+        action="Check that q1, q2, ... belong to these poses, and the poses to this controller's config",
     )

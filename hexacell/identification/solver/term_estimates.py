@@ -9,7 +9,6 @@ from hexacell.identification.solver.measurement_model import NuisanceElimination
 from hexacell.identification.terms.taken import TakenTerms, mean_of, spread_of
 from hexacell.identification.terms.term import ModelTerm
 from hexacell.kinematics.corrections import CorrectionKind, Corrections
-from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
 
 
@@ -54,7 +53,7 @@ class TermEstimates:
 
     def beside_encoders(self, directions: Array) -> Array:
         """How far joints (6,) stand from where encoders show them, by the side from which they came."""
-        beside = np.zeros(LEGS)
+        beside = np.zeros(len(directions))
         for term in self.terms:
             if term.name == CorrectionKind.BACKLASH:
                 beside = beside - 0.5 * self.of(term.name)[0] * directions
@@ -62,13 +61,20 @@ class TermEstimates:
 
     def of(self, name: str) -> tuple[Array, Array]:
         """Coefficients (6,) of one term, and one standard deviation (6,) of each."""
-        row = [term.name for term in self.terms].index(name) * LEGS
-        rows = slice(row, row + LEGS)
+        rows = self.rows([term.name for term in self.terms].index(name))
         return self.values[rows], np.sqrt(np.diag(self.covariance)[rows])
+
+    def rows(self, number: int) -> slice:
+        """Where the coefficients of a term are in ``values``."""
+        legs = len(self.values) // len(self.terms)
+        return slice(number * legs, (number + 1) * legs)
 
     def left_by(self, corrections: Corrections) -> Array:
         """What of the coefficients (6 m,) a controller with some corrections does not correct."""
-        return np.asarray(self.values - np.concatenate([corrections.of(term.name) for term in self.terms]))
+        return np.asarray(
+            self.values
+            - np.concatenate([corrections.of(term.name)[: len(term.mean)] for term in self.terms])
+        )
 
     def joint_covariance(self, of_parameters: Array) -> Array:
         """Covariance (p + 6 m, p + 6 m) of the free parameters (p, p) and the coefficients."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from hexacell.identification.placement import Placement
 from hexacell.identification.terms.term import ModelTerm, StatedMachine
-from hexacell.kinematics.parameters import LEGS, JointUnit
+from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.rotations import Array
 
 
@@ -36,4 +36,4 @@ def _lagging(placement: Placement, directions: Array) -> Array:
 
 def _where_unknown(placement: Placement, directions: Array, sizes: Array) -> Array:
     lagging = np.where(directions == 0.0, 0.5 * placement.derivatives.joints * sizes, 0.0)
-    return np.asarray(lagging[..., None] * np.eye(LEGS))
+    return np.asarray(lagging[..., None] * placement.each_leg)

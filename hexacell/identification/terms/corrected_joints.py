@@ -39,9 +39,10 @@ def _added(at: Placement, corrections: Corrections) -> tuple[Array, Array]:
     """
     centre = corrections.weight_centre_mm
     weight = Weight(np.array(corrections.weight_direction), None if centre is None else np.array(centre))
-    unknown = np.zeros_like(at.joints)
-    errors = play(1.0, weight).leg_errors(at, unknown) * corrections.play_mm
+    unknown, legs = np.zeros_like(at.joints), at.joints.shape[1]
+    play_mm, compliance_um_n = corrections.play_mm[:legs], corrections.compliance_um_n[:legs]
+    errors = play(1.0, weight).leg_errors(at, unknown) * play_mm
     yielding = compliance(1.0, corrections.weight_n, weight).leg_errors(at, unknown)
     is_between = np.abs(leg_forces(at, weight)) < HARDLY_LOADED
-    unseated = np.abs(at.as_joints(is_between * np.array(corrections.play_mm)))
-    return -at.as_joints(errors + yielding * corrections.compliance_um_n), unseated
+    unseated = np.abs(at.as_joints(is_between * np.array(play_mm)))
+    return -at.as_joints(errors + yielding * compliance_um_n), unseated

@@ -6,7 +6,7 @@ another place, at which they are pushed that were pulled, and keeps the place to
 """
 
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from itertools import product
 
 import numpy as np
@@ -14,7 +14,6 @@ import numpy as np
 from hexacell.identification.placement import Placement, Weight, leg_forces
 from hexacell.identification.terms.term import ModelTerm, StatedMachine
 from hexacell.kinematics.forward import apply_twist
-from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
 
 WRONG_SIDE = float(np.sqrt(0.5))
@@ -23,8 +22,11 @@ WRONG_SIDE = float(np.sqrt(0.5))
 HARDLY_LOADED = 0.01
 """Force of a leg, by a weight of one newton, of which nobody knows the sign."""
 
-EVERY = np.array(list(product((-1.0, 1.0), repeat=LEGS)))
-"""All sides on which six legs may lie (64, 6)."""
+
+@cache
+def every_side(legs: int) -> Array:
+    """All sides on which so many legs may lie (2^J, J)."""
+    return np.array(list(product((-1.0, 1.0), repeat=legs)))
 
 
 def play(size_mm: float, weight: Weight) -> ModelTerm:
@@ -54,8 +56,8 @@ def _on_either_side(weight: Weight, placement: Placement, _directions: Array, si
     """The other places that the platform may have, each one cause (n, 6, k)."""
     forces = leg_forces(placement, weight)
     sides, may = _sides(forces), (np.abs(forces) < HARDLY_LOADED).any(axis=1)
-    for leg in range(LEGS):
-        alone = sides * np.where(np.arange(LEGS) == leg, -1.0, 1.0)
+    for one in placement.each_leg:
+        alone = sides * np.where(one > 0.0, -1.0, 1.0)
         may |= (_sides_at(placement, sides, alone, sizes_mm, weight) != sides).any(axis=1)
     rows = np.flatnonzero(may).tolist()
     places = {row: _other_places(placement, row, forces[row], sizes_mm, weight) for row in rows}
@@ -67,18 +69,19 @@ def _on_either_side(weight: Weight, placement: Placement, _directions: Array, si
 
 def _other_places(placement: Placement, row: int, forces: Array, sizes_mm: Array, weight: Weight) -> Array:
     """The sides of the legs (k, 6) where they balance too, and of each leg whose side is not known."""
-    rows, sides = np.full(len(EVERY), row), np.tile(_sides(forces), (len(EVERY), 1))
+    every = every_side(len(forces))
+    rows, sides = np.full(len(every), row), np.tile(_sides(forces), (len(every), 1))
     at = replace(placement, poses=placement.poses[rows], joints=placement.joints[rows])
-    is_balanced = (_sides_at(at, sides, EVERY, sizes_mm, weight) == EVERY).all(axis=1)
+    is_balanced = (_sides_at(at, sides, every, sizes_mm, weight) == every).all(axis=1)
     unsure = np.abs(forces) < HARDLY_LOADED
-    differ = sides != EVERY
+    differ = sides != every
     is_other = is_balanced | (differ @ unsure & (differ.sum(axis=1) == 1))
-    return np.asarray(EVERY[is_other & differ.any(axis=1)])
+    return np.asarray(every[is_other & differ.any(axis=1)])
 
 
 def _sides_at(at: Placement, sides: Array, others: Array, sizes_mm: Array, weight: Weight) -> Array:
     """On which sides the legs would lie if they lay on ``others``, and not as now."""
-    twists = 0.5 * at.by_constraints @ ((sides - others) * sizes_mm)[..., None]
+    twists = 0.5 * at.by_legs(((sides - others) * sizes_mm)[..., None])
     moved = replace(at, poses=apply_twist(at.poses, twists[..., 0]))
     return _sides(leg_forces(moved, weight))
 

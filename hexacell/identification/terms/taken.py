@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from hexacell.identification.placement import RecordPlacement
 from hexacell.identification.terms.term import ModelTerm
 from hexacell.kinematics.forward import forward_kinematics
-from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array, Mask
 
 SWEEPS = 4
@@ -53,13 +52,14 @@ class TakenTerms:
             directions=records.directions[known],
         )
         mean = mean_of(terms)
-        by_coefficients = np.zeros((len(records), 3, LEGS * len(terms)))
+        legs = records.joints.shape[1]
+        by_coefficients = np.zeros((len(records), 3, legs * len(terms)))
         offset = np.zeros((len(records), 3))
         if values is not None:
             positions, some = some.poses.positions, deformed(terms, some, values)
             offset[known], mean = some.poses.positions - positions, mean - values
         for row, term in enumerate(terms):
-            columns = slice(row * LEGS, (row + 1) * LEGS)
+            columns = slice(row * legs, (row + 1) * legs)
             by_coefficients[known, :, columns] = term.pose_errors(some, some.directions)[:, :3]
         unknown = np.zeros_like(records.joints)
         unknown[known] = _unknown_places(terms, some, values)
@@ -77,10 +77,10 @@ class TakenTerms:
 
 def _unknown_places(terms: tuple[ModelTerm, ...], records: RecordPlacement, values: Array | None) -> Array:
     """Variance (n, 6) of joints that may be on either side, by coefficients of some values (6 m,)."""
-    variance = np.zeros_like(records.joints)
+    variance, legs = np.zeros_like(records.joints), records.joints.shape[1]
     for row, term in enumerate(terms):
         if term.on_either_side is not None:
-            size = term.mean if values is None else values[row * LEGS : (row + 1) * LEGS]
+            size = term.mean if values is None else values[row * legs : (row + 1) * legs]
             squares = np.sum(term.on_either_side(records, records.directions, size) ** 2, axis=-1)
             variance = variance + records.as_joints(np.sqrt(squares)) ** 2
     return variance
@@ -92,11 +92,11 @@ def deformed(terms: tuple[ModelTerm, ...], records: RecordPlacement, values: Arr
     Forces are those where it is then: a compliant leg yields a little more for what it has yielded. Where
     no such pose is found it stays.
     """
-    at = records
+    at, legs = records, records.joints.shape[1]
     for _ in range(SWEEPS):
         errors = np.zeros_like(records.joints)
         for row, term in enumerate(terms):
-            coefficients = values[row * LEGS : (row + 1) * LEGS]
+            coefficients = values[row * legs : (row + 1) * legs]
             errors = errors + term.leg_errors(at, records.directions) * coefficients
         joints = records.joints + records.as_joints(errors)
         solved = forward_kinematics(records.mechanism, records.geometry, joints, records.poses)
@@ -114,9 +114,9 @@ def mean_of(terms: tuple[ModelTerm, ...]) -> Array:
 def spread_of(terms: tuple[ModelTerm, ...]) -> Array:
     """(6 m, k) coefficients of all m terms by one standard deviation of each independent part."""
     parts = [term.spread for term in terms]
-    every = np.zeros((LEGS * len(parts), sum(part.shape[1] for part in parts)))
-    first = 0
-    for row, part in enumerate(parts):
-        every[row * LEGS : (row + 1) * LEGS, first : first + part.shape[1]] = part
-        first += part.shape[1]
+    every = np.zeros((sum(len(part) for part in parts), sum(part.shape[1] for part in parts)))
+    row = column = 0
+    for part in parts:
+        every[row : row + len(part), column : column + part.shape[1]] = part
+        row, column = row + len(part), column + part.shape[1]
     return every

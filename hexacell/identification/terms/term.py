@@ -14,7 +14,7 @@ from enum import StrEnum
 import numpy as np
 
 from hexacell.identification.placement import Placement, Weight
-from hexacell.kinematics.parameters import LEGS, JointUnit
+from hexacell.kinematics.parameters import CONSTRAINTS, JointUnit
 from hexacell.kinematics.rotations import Array
 
 LegErrors = Callable[[Placement, Array], Array]
@@ -94,7 +94,7 @@ class ModelTerm:
             there; None where that is always known.
         weight: under which it acts; None where that does not matter.
         of_weight: the same term under another weight.
-        mean: coefficients (6,) as they are expected.
+        mean: coefficients (J,) as they are expected.
         sigma: one standard deviation of each (6,), where they were identified before; None: see ``size``.
     """
 
@@ -108,7 +108,7 @@ class ModelTerm:
     on_either_side: ErrorsOfSizes | None = None
     weight: Weight | None = None
     of_weight: "Callable[[Weight], ModelTerm] | None" = None
-    mean: Array = field(default_factory=lambda: np.zeros(LEGS))
+    mean: Array = field(default_factory=lambda: np.zeros(CONSTRAINTS))
     sigma: Array | None = None
 
     @property
@@ -116,9 +116,10 @@ class ModelTerm:
         """(6, k) coefficients by one standard deviation of each independent part."""
         if self.sigma is not None:
             return np.diag(self.sigma)
-        return self.size * np.concatenate([np.ones((LEGS, 1)), np.eye(LEGS)], axis=1)
+        legs = len(self.mean)
+        return self.size * np.concatenate([np.ones((legs, 1)), np.eye(legs)], axis=1)
 
     def pose_errors(self, placement: Placement, directions: Array) -> Array:
-        """Errors of the poses (n, 6, 6), mm and rad, by one unit of each leg's coefficient."""
+        """Errors of the poses (n, 6, J), mm and rad, by one unit of each leg's coefficient."""
         errors = self.leg_errors(placement, directions)
-        return np.asarray(placement.by_constraints * errors[:, None, :])
+        return np.asarray(placement.by_constraints[..., : errors.shape[1]] * errors[:, None, :])

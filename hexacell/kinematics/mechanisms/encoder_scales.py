@@ -16,7 +16,7 @@ import numpy as np
 from hexacell.kinematics.geometry import Geometries, GeometriesType, Geometry
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import Branch, ConstraintDerivatives, FrameConvention, Guides, Mechanism
-from hexacell.kinematics.parameters import ParameterKind, ParameterSet, ParameterUnit
+from hexacell.kinematics.parameters import ParameterKind, ParameterSet, ParameterUnit, each_of
 from hexacell.kinematics.pose import FrameTransform, PoseBatch
 from hexacell.kinematics.rotations import Array
 
@@ -36,9 +36,10 @@ class WithEncoderScales(Mechanism):
 
     def __init__(self, exact: Mechanism) -> None:
         self.exact = exact
-        self.name, self.words = exact.name, exact.words
-        own = exact.parameters
-        self.parameters = ParameterSet((*own.kinds, ENCODER_SCALE), own.has_branch)
+        self.name, self.words, self.coordinates = exact.name, exact.words, exact.coordinates
+        own, legs = exact.parameters, exact.joint_count
+        scale = replace(ENCODER_SCALE, owners=each_of(legs))
+        self.parameters = ParameterSet((*own.kinds, scale), own.has_branch)
         rules = exact.convention
         self.convention = FrameConvention(rules.name, self.parameters, rules.zero, rules.equal)
         self.frame_freedom = replace(exact.frame_freedom, size=True)
@@ -52,11 +53,16 @@ class WithEncoderScales(Mechanism):
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
         exact = self.exact.derivatives(self.without_scales(geometry), poses, _actual(geometry, joints))
+        by_scale = np.zeros((*exact.parameters.shape[:2], 1))
+        by_scale[:, : joints.shape[1], 0] = exact.joints * joints
         return ConstraintDerivatives(
             pose=exact.pose,
             joints=exact.joints * (1.0 + geometry["encoder_scale"]),
-            parameters=np.concatenate([exact.parameters, (exact.joints * joints)[..., None]], axis=-1),
+            parameters=np.concatenate([exact.parameters, by_scale], axis=-1),
         )
+
+    def completed(self, geometry: Geometry, poses: PoseBatch) -> PoseBatch:
+        return self.exact.completed(self.without_scales(geometry), poses)
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
         actual = self.exact.inverse(self.without_scales(geometry), branch, poses)

@@ -102,7 +102,7 @@ class GoughStewart(JointedLegs):
 
     def inverse(self, geometry: Geometry, branch: mechanism.Branch, poses: PoseBatch) -> Array:
         """Joint variables (n, 6) at n poses; every pose has a solution."""
-        _, v = self.leg_vectors(geometry, poses, np.zeros(6))
+        _, v = self.leg_vectors(geometry, poses, np.zeros(self.joint_count))
         joints: Array = np.linalg.norm(v, axis=-1) - geometry["offset"]
         return joints
 
@@ -110,7 +110,7 @@ class GoughStewart(JointedLegs):
         return np.ones_like(joints)
 
     def encoder_zeros(self, geometry: Geometry) -> Array:
-        return self.parameters.changes("offset", np.eye(6))
+        return self.parameters.changes("offset", np.eye(self.joint_count))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

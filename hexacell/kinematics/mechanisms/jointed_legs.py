@@ -32,23 +32,31 @@ class JointedLegs(Mechanism):
     opposite: str = ""
 
     def base_ends(self, geometry: Geometries, joints: Array) -> Array:
-        """The joints at the base's end, (n, 6, 3) or (6, 3), in the base frame, mm."""
+        """The joints at the base's end, (n, J, 3) or (J, 3), in the base frame, mm."""
         return geometry[self.base_joint]
 
     def derivatives_at_base(self, geometry: Geometry, joints: Array, n: Array) -> tuple[Array, list[Array]]:
-        """Derivatives of the lengths by joint variables (n, 6) and other parameters at the base (n, 6, c).
+        """Derivatives of the lengths by joint variables (n, J) and other parameters at the base (n, J, c).
 
-        ``n`` (n, 6, 3) are the directions of the legs, from the platform to the base.
+        ``n`` (n, J, 3) are the directions of the legs, from the platform to the base.
         """
         return -np.ones_like(joints), []
 
+    def platform_joints(self, geometry: Geometries) -> Array:
+        """The legs' joints on the platform, (n, J, 3) or (J, 3), in its frame, mm."""
+        return geometry[self.platform_joint]
+
+    def derivatives_at_platform(self, poses: PoseBatch, n: Array) -> Array:
+        """Derivatives (n, J, c) of the lengths by the parameters of the joints on the platform."""
+        return -n @ poses.rotations
+
     def lengths(self, geometry: Geometries, joints: Array) -> Array:
-        """How long the legs should be, mm, (n, 6) or (6,)."""
+        """How long the legs should be, mm, (n, J) or (J,)."""
         return geometry[self.length]
 
     def leg_vectors(self, geometry: Geometries, poses: PoseBatch, joints: Array) -> tuple[Array, Array]:
-        """R B_i (n, 6, 3), and the vectors (n, 6, 3) from the platform joints to the base's end, mm."""
-        b = geometry[self.platform_joint] @ np.swapaxes(poses.rotations, -1, -2)
+        """R B_i (n, J, 3), and the vectors (n, J, 3) from the platform joints to the base's end, mm."""
+        b = self.platform_joints(geometry) @ np.swapaxes(poses.rotations, -1, -2)
         return b, self.base_ends(geometry, joints) - poses.positions[:, None, :] - b
 
     def residual_and_jacobian(
@@ -63,7 +71,8 @@ class JointedLegs(Mechanism):
         n = v / np.sqrt(np.einsum("nij,nij->ni", v, v))[..., None]
         by_joints, by_others = self.derivatives_at_base(geometry, joints, n)
         by_length = -np.ones((*joints.shape, 1))
-        by_parameters = np.concatenate([n, *by_others, -n @ poses.rotations, by_length], axis=-1)
+        at_platform = self.derivatives_at_platform(poses, n)
+        by_parameters = np.concatenate([n, *by_others, at_platform, by_length], axis=-1)
         return ConstraintDerivatives(by_pose(b, -n), by_joints, by_parameters)
 
     def convention_frames(self, geometry: Geometry) -> FrameTransform:
@@ -104,7 +113,7 @@ class JointedLegs(Mechanism):
 
     def platform_radius(self, geometry: Geometries) -> Array:
         def compute() -> Array:
-            joints = geometry[self.platform_joint]
+            joints = self.platform_joints(geometry)
             return np.asarray(np.sqrt(np.einsum("...i,...i->...", joints, joints)).mean(axis=-1))
 
         return geometry.once("mean radius", compute)

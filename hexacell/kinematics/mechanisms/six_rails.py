@@ -30,7 +30,7 @@ from hexacell.kinematics.legs import CLOSEST_JOINTS_MM, axes_through
 from hexacell.kinematics.mechanism import Branch, FrameConvention, FrameFreedom, Guides, MechanismWords
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.mechanisms.jointed_legs import JointedLegs
-from hexacell.kinematics.parameters import ParameterKind, ParameterSet, ParameterUnit
+from hexacell.kinematics.parameters import ParameterKind, ParameterSet, ParameterUnit, each_of
 from hexacell.kinematics.pose import FrameTransform, PoseBatch
 from hexacell.kinematics.rotations import Array, TurnedAxes, turns_of
 
@@ -54,9 +54,6 @@ FIRST_RAIL_FRAME = FrameConvention(
     equal=(("B1z", "B3z", "B5z"), ("B1y", "B3y")),
 )
 
-OWN_RAILS = tuple((leg,) for leg in range(6))
-"""Each slider has a rail of its own."""
-
 
 class SixRails(JointedLegs):
     """6-PUS with any rails."""
@@ -70,7 +67,7 @@ class SixRails(JointedLegs):
     opposite = "a slider counts the opposite way of slider 1"
 
     def base_ends(self, geometry: Geometries, joints: Array) -> Array:
-        return geometry["S"] + joints[..., None] * _directions(geometry)
+        return geometry["S"] + joints[..., None] * directions(geometry)
 
     def derivatives_at_base(self, geometry: Geometry, joints: Array, n: Array) -> tuple[Array, list[Array]]:
         axes = TurnedAxes.by(geometry["rail"])
@@ -78,20 +75,20 @@ class SixRails(JointedLegs):
         return np.einsum("nij,ij->ni", n, axes.axis), [by_rail]
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
-        _, v = self.leg_vectors(geometry, poses, np.zeros((len(poses), 6)))
-        along = np.einsum("nij,ij->ni", v, _directions(geometry))
+        _, v = self.leg_vectors(geometry, poses, np.zeros((len(poses), self.joint_count)))
+        along = np.einsum("nij,ij->ni", v, directions(geometry))
         squared = geometry["l"] ** 2 - np.einsum("nij,nij->ni", v, v) + along**2
         root = np.sqrt(np.where(squared >= 0.0, squared, np.nan))
         return np.asarray(np.asarray(branch) * root - along)
 
     def branch(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
         _, v = self.leg_vectors(geometry, poses, joints)
-        return np.where(np.einsum("nij,ij->ni", v, _directions(geometry)) < 0.0, -1, 1)
+        return np.where(np.einsum("nij,ij->ni", v, directions(geometry)) < 0.0, -1, 1)
 
     def convention_frames(self, geometry: Geometry) -> FrameTransform:
         """Rail 1 along z from the origin, slider 3 at y = 0, x > 0; the platform's joints 1, 3 and 5."""
         S, B = geometry["S"], geometry["B"]
-        z, toward = _directions(geometry)[0], S[2] - S[0]
+        z, toward = directions(geometry)[0], S[2] - S[0]
         x = toward - (toward @ z) * z
         if (across := np.linalg.norm(x)) < CLOSEST_JOINTS_MM:
             raise UsageError("two slider joints that fix the frame are on one rail")
@@ -100,23 +97,24 @@ class SixRails(JointedLegs):
         return FrameTransform(base, S[0].copy(), axes_through(B[0], B[2], B[4], "platform"))
 
     def turned(self, geometry: Geometry, change: FrameTransform) -> dict[str, Array]:
-        return {"rail": turns_of(_directions(geometry) @ change.base.T)}
+        return {"rail": turns_of(directions(geometry) @ change.base.T)}
 
     def encoder_zeros(self, geometry: Geometry) -> Array:
         """The sliders, along their rails."""
-        moved = np.zeros((6, 3, 6))
-        moved[np.arange(6), :, np.arange(6)] = _directions(geometry)
+        legs = np.arange(self.joint_count)
+        moved = np.zeros((len(legs), 3, len(legs)))
+        moved[legs, :, legs] = directions(geometry)
         return self.parameters.changes("S", moved)
 
     def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
         _, v = self.leg_vectors(geometry, poses, joints)
         n = v / np.linalg.norm(v, axis=-1, keepdims=True)
         by_turns = TurnedAxes.by(geometry["rail"]).by_turns[2]
-        along = np.einsum("ij,ij->i", geometry["S"], _directions(geometry)) + joints
+        along = np.einsum("ij,ij->i", geometry["S"], directions(geometry)) + joints
         across = np.einsum("nij,ijk->nik", n, by_turns / np.linalg.norm(by_turns, axis=1, keepdims=True))
-        return Guides(OWN_RAILS, along, across)
+        return Guides(each_of(self.joint_count), along, across)
 
 
-def _directions(geometry: Geometries) -> Array:
-    """Unit vectors (..., 6, 3) along the rails."""
+def directions(geometry: Geometries) -> Array:
+    """Unit vectors (..., J, 3) along the rails."""
     return geometry.once("directions of the rails", lambda: TurnedAxes.by(geometry["rail"]).axis)

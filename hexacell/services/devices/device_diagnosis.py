@@ -134,7 +134,7 @@ async def _watch_encoders(encoders: EncoderBank, settings: CellSettings, seconds
 
     try:
         identities = await encoders.open()
-        names = [f"encoder {leg}" for leg in range(1, 7)]
+        names = [f"encoder {leg}" for leg in range(1, settings.mechanism.joint_count + 1)]
         seen = await _watched(read, seconds, names, str(settings.encoders.unit))
     finally:
         await encoders.close()

@@ -13,7 +13,7 @@ from drivers.discovery import USUAL, FoundController, SearchTimeouts, encoders, 
 from drivers.discovery.gauges import FoundGauge, PortFindings, probe_of, search_port
 from drivers.serial.opening import SerialPortFound, serial_ports
 from hexacell.cell.robot import DEFAULT_CONTROLLER
-from hexacell.kinematics.parameters import LEGS, JointUnit
+from hexacell.kinematics.parameters import CONSTRAINTS, JointUnit
 from hexacell.noise.standstill import PADDED
 from hexacell.plugins import Group, load, names
 from hexacell.services.devices.cell_answers import GAUGE_AXES, Document
@@ -116,6 +116,6 @@ def encoder_keys(nodes: tuple[encoders.FoundNode, ...]) -> Document:
     if len(steps) == 1 and None not in steps:
         word = "counts_per_turn" if nodes[0].unit is JointUnit.DEG else "measuring_step_nm"
         keys[word] = steps.pop()
-    if len(nodes) == LEGS and None not in numbers:
+    if len(nodes) == CONSTRAINTS and None not in numbers:
         keys["serial_numbers"] = numbers
     return keys

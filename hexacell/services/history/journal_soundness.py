@@ -19,7 +19,7 @@ from hexacell.cell.measuring import MOST_POINTS, MOST_POSES
 from hexacell.cell.model import CellSettings
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.parameters import LEGS
+from hexacell.kinematics.pose import AXES
 from hexacell.runs.run_folder import RunFolder
 from procedures.journal.journal import RESTORE, Entry, read_entries
 from procedures.run.keys import Phase, SetKey
@@ -164,7 +164,8 @@ class _Event:
             yield from _out_of_range(step.pose, LARGEST_NUMBER)
         reading = event if isinstance(event, events.StandstillRead) else getattr(event, "reading", None)
         counts = () if reading is None else reading.counts
-        is_round = all(len(one) == LEGS and max(map(abs, one)) <= LARGEST_COUNT for one in counts)
+        legs = self.settings.mechanism.joint_count
+        is_round = all(len(one) == legs and max(map(abs, one)) <= LARGEST_COUNT for one in counts)
         if reading is not None and not (counts and is_round):
             yield "the encoders have other counts"
         if (at_s := getattr(reading, "at_s", None)) is not None and not 0.0 <= at_s <= LARGEST_TIME_S:
@@ -174,9 +175,10 @@ class _Event:
         match self.event:
             case events.RunStarted() as started:
                 yield from self._geometries(started.controller, started.taught)
-                yield from _range_problems(started.joint_ranges, "joint ranges")
-                yield from _range_problems(started.limits.joints, "joint ranges")
-                yield from _range_problems(started.limits.axes, "axes")
+                legs = self.settings.mechanism.joint_count
+                yield from _range_problems(started.joint_ranges, "joint ranges", legs)
+                yield from _range_problems(started.limits.joints, "joint ranges", legs)
+                yield from _range_problems(started.limits.axes, "axes", len(AXES))
                 if started.accepted is not None:
                     yield from self._covariance(started.accepted.covariance)
                     yield from _out_of_range(started.accepted.model_dump(exclude={"at"}), LARGEST_VARIANCE)
@@ -186,7 +188,7 @@ class _Event:
             case events.ProvisionalApplied() as applied:
                 yield from self._geometries(applied.geometry)
             case events.NoiseMeasured() as measured:
-                yield from _noise_problems(measured)
+                yield from _noise_problems(measured, self.settings.mechanism.joint_count)
             case events.Identified() as identified:
                 yield from self._identified(identified)
             case events.Proposed() as proposed:
@@ -243,17 +245,19 @@ class _Event:
             yield "this is no covariance"
 
 
-def _range_problems(ranges: Sequence[tuple[float, float] | None] | None, what: str) -> Iterator[str]:
+def _range_problems(
+    ranges: Sequence[tuple[float, float] | None] | None, what: str, count: int
+) -> Iterator[str]:
     if ranges is not None:
-        if len(ranges) != LEGS:
-            yield f"there are six {what}"
+        if len(ranges) != count:
+            yield f"there are {len(ranges)} {what}, not {count}"
         yield from _out_of_range([one for one in ranges if one is not None], LARGEST_NUMBER)
 
 
-def _noise_problems(measured: events.NoiseMeasured) -> Iterator[str]:
+def _noise_problems(measured: events.NoiseMeasured, legs: int) -> Iterator[str]:
     noise = measured.noise
-    if len(noise.encoders) != LEGS:
-        yield "there are six encoders"
+    if len(noise.encoders) != legs:
+        yield f"there are {len(noise.encoders)} encoders, not {legs}"
     if not all(one.record > 0.0 for one in (*noise.gauges, *noise.encoders)):
         yield "an instrument has no noise"
     if not 1 <= noise.windows <= 16:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from math import hypot
 
 from hexacell.identification.identified_zeros import ParameterChoice
-from hexacell.kinematics.parameters import LEGS, JointUnit
+from hexacell.kinematics.parameters import JointUnit
 from hexacell.lengths import UM, unit_of
 from hexacell.results.run_comparison import compare_results
 from hexacell.services.history.reported_run import ReportedRun
@@ -100,7 +100,10 @@ def terms_chapter(run: ReportedRun) -> Chapter | None:
     text, taken = run_terms_text(run.state), run.state.found_terms.taken
     if not text:
         return None
-    columns, rows = ["Joint or leg"], [[str(number + 1)] for number in range(LEGS)]
+    columns, rows = (
+        ["Joint or leg"],
+        [[str(leg)] for leg in range(1, run.settings.mechanism.joint_count + 1)],
+    )
     for term in taken:
         columns += [f"{term.name}, {term.unit}", "U (k = 2)"]
         for row, value, sigma in zip(rows, term.values or (), term.sigma or (), strict=True):

@@ -26,7 +26,8 @@ def live_items(live: LiveSnapshot | None, *, is_checking: bool) -> tuple[Checkli
         _device(f"gauge {one.name}", one.problem, "" if one.shown_mm is None else f"{one.shown_mm:+.3f} mm")
         for one in live.gauges
     ]
-    found = "" if live.encoders.value is None else "six positions"
+    sample = live.encoders.value
+    found = "" if sample is None else f"{len(sample.positions)} positions"
     encoders = _device("encoders", live.encoders.problem, found)
     status = live.controller.value
     stopped = "; in emergency stop, asked about at the start" if status and status.estop else ""

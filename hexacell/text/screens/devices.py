@@ -1,6 +1,7 @@
 """A cell and its devices: what its file states, and what they show now: a card each, a line a gauge."""
 
 from collections.abc import Iterator
+from itertools import zip_longest
 
 from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.cell.loader import Cell
@@ -79,8 +80,10 @@ def _encoder_card(encoders: Shown[EncoderSample], later_s: float) -> Card:
     if encoders.problem or (sample := encoders.value) is None:
         return _without_value("encoders", "NO READING", encoders.problem, age)
     numbered = [f"{number} {position:+8.2f}" for number, position in enumerate(sample.positions, start=1)]
-    lines = [f"{left}  {right}" for left, right in zip(numbered[:3], numbered[3:], strict=True)]
-    return Card("encoders", "ok", Urgency.GOOD, f"six positions, {sample.unit}", (*lines, age))
+    rows = (len(numbered) + 1) // 2
+    pairs = zip_longest(numbered[:rows], numbered[rows:], fillvalue="")
+    lines = [f"{left}  {right}".rstrip() for left, right in pairs]
+    return Card("encoders", "ok", Urgency.GOOD, f"{len(numbered)} positions, {sample.unit}", (*lines, age))
 
 
 def _controller_card(controller: Shown[ControllerStatus], later_s: float) -> Card:

@@ -39,7 +39,7 @@ QUESTIONS = {
         "Where is the CAN bus of the encoders?",
         "Interface, channel and bit/s, such as: socketcan can0 500000, or: slcan /dev/ttyACM0 500000.",
     ),
-    "nodes": ("Which nodes are the encoders of legs 1 to 6?", "Six numbers, in the order of the legs."),
+    "nodes": ("Which nodes are the encoders of the legs?", "A number a leg, in the order of the legs."),
     "plates": (
         "How far may the ball go from the middle of the gauges' plates, mm?",
         "Half of their width, less what the ball needs.",

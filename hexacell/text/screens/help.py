@@ -3,7 +3,7 @@
 SCREEN_HELP = {
     "cell": """\
 What is attached shows here as it is now, a card each: gauges with reading, place in their travel, noise \
-and age, the six encoders, the controller, the stop line. Below are the cell in a few lines and the robot. \
+and age, the encoders, the controller, the stop line. Below are the cell in a few lines and the robot. \
 f shows the whole cell file; behind each value is its line, or "default" where the file does not state it.
 
 A device that does not answer says why. Mend that before you go to 2 Preflight.""",

@@ -8,12 +8,13 @@ import numpy as np
 from hexacell.campaign.forecast import select_sets
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.loader import Cell
-from hexacell.design.arrival_sides import SIDES, WORTH_A_MOVE
+from hexacell.design.arrival_sides import WORTH_A_MOVE
 from hexacell.design.candidates import orientations, outcomes_of, reachable
 from hexacell.design.criteria import D_OPTIMAL, covariance_update
 from hexacell.design.predicted_records import position_derivatives
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.term_estimates import TermEstimates
+from hexacell.identification.terms.play import every_side
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -126,7 +127,7 @@ def _best_sides(belief: RobotBelief, commands: PoseBatch) -> Array:
     noise = belief.noise.record_covariance(position_derivatives(belief, targets[:1])[1])
     first = position_derivatives(belief, targets[:1], came[:1])[0]
     for row in range(1, len(sides)):
-        ways = np.concatenate([came[[row]], SIDES])
+        ways = np.concatenate([came[[row]], every_side(sides.shape[1])])
         there = targets[np.full(len(ways), row)]
         changes, by_joints = position_derivatives(belief, there, ways)
         changes, scatter = changes - first, noise + belief.noise.record_covariance(by_joints)

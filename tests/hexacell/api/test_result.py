@@ -71,8 +71,8 @@ def test_columns_that_are_no_records_are_refused_with_their_place(noisy) -> None
     ):
         with pytest.raises((FileError, UsageError), match=told):
             api.measurements_of({**columns, **change})
-    with pytest.raises(FileError, match="columns are missing: q6"):
-        api.measurements_of({name: column for name, column in columns.items() if name != "q6"})
+    with pytest.raises(FileError, match="columns are missing: q5"):
+        api.measurements_of({name: column for name, column in columns.items() if name != "q5"})
 
 
 def test_a_frame_needs_pandas_and_nothing_else_does(noisy, monkeypatch) -> None:

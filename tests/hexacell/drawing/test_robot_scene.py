@@ -19,11 +19,12 @@ def balls(scene: Scene, role: Role) -> np.ndarray:
     return np.concatenate(lines(scene, role, Form.BALL))
 
 
-def test_every_robot_has_six_numbered_legs_from_its_drives_to_its_platform(any_robot) -> None:
+def test_every_robot_has_numbered_legs_from_its_drives_to_its_platform(any_robot) -> None:
     scene, pose = any_robot.scene, any_robot.pose
     legs = lines(scene, Role.LEG)
     numbers = [one for one in scene if one.form is Form.WORD and one.role is Role.LEG]
-    assert [one.text for one in numbers] == list("123456")
+    count = any_robot.robot.mechanism.joint_count
+    assert [one.text for one in numbers] == list("123456"[:count])
     for leg, number, drive, joint in zip(
         legs, numbers, balls(scene, Role.DRIVE), balls(scene, Role.PLATFORM), strict=True
     ):

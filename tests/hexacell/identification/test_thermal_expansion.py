@@ -126,10 +126,10 @@ def test_gaps_are_filled_and_the_first_record_is_the_reference(told) -> None:
 
 def test_a_leg_without_a_thermometer_is_like_the_base() -> None:
     rows = [(None, 20.0, 20.0, 20.0, 20.0, 20.0, base) for base in (20.0, 22.0)]
-    assert known_parts(rows) == frozenset()
-    assert known_parts([(1.0, *row[1:]) for row in rows]) == {MachinePart.LEGS, MachinePart.BASE}
-    assert known_parts([(1.0, *row[1:6]) for row in rows]) == {MachinePart.LEGS}
-    assert known_parts([]) == frozenset()
+    assert known_parts(rows, 6) == frozenset()
+    assert known_parts([(1.0, *row[1:]) for row in rows], 6) == {MachinePart.LEGS, MachinePart.BASE}
+    assert known_parts([(1.0, *row[1:6]) for row in rows], 6) == {MachinePart.LEGS}
+    assert known_parts([], 6) == frozenset()
 
 
 @pytest.mark.parametrize(("column", "share"), [(0, (1.1, 1.0)), (1, (1.0, 1.1))])

@@ -87,9 +87,25 @@ def test_vectors_arrays_and_documents_have_consistent_order() -> None:
     np.testing.assert_array_equal(RAILS.array(numbers, "l"), numbers[12:])
     np.testing.assert_array_equal(RAILS.vector(RAILS.document(numbers)), numbers)
     of_legs = np.array([[f"r{leg}a", f"r{leg}b", f"l{leg}"] for leg in range(1, 7)]).ravel()
-    assert tuple(of_legs[RAILS.leg_order]) == RAILS.names
-    every_leg = RAILS.of_every_leg(np.array([1.0, 2.0, 3.0]))
+    assert tuple(of_legs[RAILS.first_places]) == RAILS.names
+    assert not RAILS.further_places
+    every_leg = RAILS.of_every_row(np.array([1.0, 2.0, 3.0]))
     np.testing.assert_array_equal(every_leg[[0, 1, 2, 12]], [1, 2, 1, 3])
+
+
+def test_what_legs_share_has_a_place_in_the_derivatives_of_each() -> None:
+    """Two halves of a platform hold two legs each; a passive constraint has one number of its own."""
+    own = ParameterKind("l", (), "lengths", "every length", owners=((0,), (1,), (2,), (3,)))
+    half = ParameterKind("h", ("x", "y"), "halves", "both", owners=((0, 1), (2, 3)))
+    skew = ParameterKind("s", (), "angle", "it", owners=((4,),))
+    shared = ParameterSet((own, half, skew))
+    assert shared.names == ("l1", "l2", "l3", "l4", "h1x", "h1y", "h2x", "h2y", "s1")
+    assert (shared.legs, shared.columns) == (4, 3)
+    by_constraint = shared.by_constraint(np.arange(1.0, 10.0))
+    expected = [[1, 5, 6], [2, 5, 6], [3, 7, 8], [4, 7, 8], [9, 0, 0], [0, 0, 0]]
+    np.testing.assert_array_equal(by_constraint, expected)
+    assert shared.first_places.tolist() == [0, 3, 6, 9, 1, 2, 7, 8, 12]
+    assert shared.further_places == ((4, 4), (5, 5), (6, 10), (7, 11))
 
 
 def test_the_balls_offset_needs_three_coordinates() -> None:

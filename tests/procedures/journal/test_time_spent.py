@@ -14,7 +14,7 @@ from hexacell.motion.durations import line_duration
 from hexacell.robot.model import robot_of
 from procedures.journal.journal import Entry
 from procedures.journal.time_spent import overheads_of, time_spent
-from procedures.run.keys import Phase, SetKey
+from procedures.run.keys import Phase, SetKey, SixNumbers
 from procedures.steps import events
 from tests.procedures.story import Story
 from tests.small_cell import changed
@@ -68,22 +68,27 @@ def test_a_fast_clock_counts_for_the_machine_alone() -> None:
     assert found == {TimeKind.MOVING: 1.0, TimeKind.DECIDING: 0.1, TimeKind.READING: 0.6}
 
 
+def move_to(orientation: int, pose: SixNumbers) -> events.Event:
+    return events.StepBegun(step=events.Move(at=AT, orientation=orientation, pose=pose))
+
+
 def a_run(moves: int, clock_factor: float = 1.0) -> Overheads | None:
     """Of moves that take 0.7 s longer than their ways, one 5.7 s, and of readings 0.45 s than a window."""
     cell = load_cell(bundled_config("simulated-hexaglide"))
     settings = changed(cell.settings, {"timing.clock_factor": clock_factor, "timing.window_s": 0.4})
     robot, speeds = robot_of(cell), speed_limits(settings.speed, at_gauges=True)
-    poses = [(*POSE[:3], tilt, 0.0, 0.0) for tilt in (0.0, 4.0)]
-    ends = [Pose(*pose) for pose in poses]
-    line_s = line_duration(robot.mechanism, robot.controller, robot.branch, *ends, speeds)
-    story, entries, at_s = Story(AT), [], 0.0
+    poses = POSE, (0.0, 0.0, 550.0, 4.0, 0.0, 0.0)
+    start, end = (Pose(*pose) for pose in poses)
+    line_s = line_duration(robot.mechanism, robot.controller, robot.branch, start, end, speeds)
+    story, at_s = Story(AT), 0.0
+    entries: list[Entry] = []
     for number in range(moves):
-        at = {"at": AT, "orientation": 2 + number, "pose": poses[number % 2]}
+        pose, orientation = poses[number % 2], 2 + number
         for event, seconds in (
-            (events.StepBegun(step=events.Move(**at)), line_s + (5.7 if number == 5 else 0.7)),
-            (story.arrived(2 + number, at["pose"]), 0.01),
-            (events.StepBegun(step=events.Sample(**at)), 0.85),
-            (story.sampled(2 + number, pose=at["pose"]), 0.01),
+            (move_to(orientation, pose), line_s + (5.7 if number == 5 else 0.7)),
+            (story.arrived(orientation, pose), 0.01),
+            (SAMPLE, 0.85),
+            (story.sampled(orientation, pose=pose), 0.01),
         ):
             entries.append(Entry(len(entries) + 1, datetime.now(UTC), at_s, event))
             at_s += seconds
@@ -93,7 +98,8 @@ def a_run(moves: int, clock_factor: float = 1.0) -> Overheads | None:
 def test_moves_and_readings_tell_what_the_next_will_take() -> None:
     found = a_run(12)
     assert found is not None
-    assert (found.move_s, found.reading_s) == (pytest.approx(0.7), pytest.approx(0.45))
+    assert found.move_s == pytest.approx(0.7)
+    assert found.reading_s == pytest.approx(0.45)
     assert found.place_s is None, "nobody placed the gauges"
     assert a_run(6) is None, "too few"
     assert a_run(12, clock_factor=10.0) is None, "mostly the computer's own time"

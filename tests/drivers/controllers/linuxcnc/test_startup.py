@@ -104,7 +104,7 @@ async def test_a_server_without_the_optional_queries_is_accepted(driver, control
         ("program_codes", "G0 G91 G49", r"takes coordinates as relative \(G91\). Send G90"),
         ("program_codes", "G0 G90 G43", r"adds a tool length \(G43\). Send G49"),
         ("pos_offset", "0 -5.0 0 0 0 0", r"adds an offset of 0 -5 .*Clear it"),
-        ("pos_offset", "0 garbled", "'0 garbled' where six positions belong"),
+        ("pos_offset", "0 garbled", "'0 garbled' where 6 positions belong"),
         ("feed_override", "120", r"moves 120 % as fast as it is commanded \(feed override\)"),
         ("feed_override", "50", ""),
         ("feed_override", "strange", ""),

@@ -39,6 +39,14 @@ class TestRotaryCranks(MechanismConformance):
     example = example_of("rotary-cranks")
 
 
+class TestFiveLegs(MechanismConformance):
+    example = example_of("five-legs")
+
+
+class TestFourArms(MechanismConformance):
+    example = replace(example_of("four-arms"), tilt_deg=50.0)
+
+
 def with_rails(directions: np.ndarray) -> MechanismExample:
     """The Linapod with rails along other vectors (6, 3)."""
     vertical = example_of("linapod")

@@ -67,9 +67,8 @@ class TestConformance(MechanismConformance):
                 twisted = apply_twist(at, np.tile(step, (len(at), 1)))
                 return MECHANISM.residual_and_jacobian(geometry, twisted, joints)[0]
 
-            per_leg = MECHANISM.parameters.numbers_per_leg
-            of_legs = found.parameters[:, :, None, :] * np.eye(6)[..., None]
-            all_of_them = of_legs.reshape(*joints.shape, 6 * per_leg)[..., MECHANISM.parameters.leg_order]
+            of_own = MECHANISM.parameters.by_constraint(np.eye(len(MECHANISM.parameters)))
+            all_of_them = np.einsum("nic,icp->nip", found.parameters, of_own)
             compare(all_of_them @ convention.basis, by_parameters, np.full(len(free), 1e-3))
             compare(found.pose, by_twist, np.repeat([1e-3, 1e-6], 3))
 

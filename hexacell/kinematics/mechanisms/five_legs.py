@@ -86,5 +86,6 @@ class FiveLegs(HeldDirections, GoughStewart):
 
 def _unit(vector: Array, part: str) -> Array:
     if (size := np.linalg.norm(vector)) < CLOSEST_JOINTS_MM:
-        raise UsageError(f"the {part} joints of legs 1 and 3 that fix the frame are in one line")
+        problem = f"the {part} joints of legs 1 and 3 that fix the frame are in one line"
+        raise UsageError(problem, action="Correct the joints, or number the legs otherwise")
     return vector / size

@@ -102,6 +102,7 @@ class FourArms(HeldDirections, SixRails):
 def _about_z(along: Array, what: str) -> Array:
     """The turn (3, 3) about z after which a vector (2,) points along x."""
     if (size := np.linalg.norm(along)) < CLOSEST_JOINTS_MM:
-        raise UsageError(f"two {what} that fix the frame are at one place")
+        problem = f"two {what} that fix the frame are at one place"
+        raise UsageError(problem, action="Correct them in the drawing or the config")
     x, y = along / size
     return np.array([[x, y, 0.0], [-y, x, 0.0], [0.0, 0.0, 1.0]])

@@ -224,7 +224,9 @@ def select_sets(
     limits = drawn.limits
     rotated = candidates.orientations(candidate_count, limits.tilt, seed, most_twist=limits.turn)
     orientations = limits.orientations(np.concatenate([np.eye(3)[None], rotated]))
-    return tuple(_select(drawn, PoseBatch.at(point, orientations), records) for point in points)
+    poses = (PoseBatch.at(point, orientations) for point in points)
+    completed = (drawn.mechanism.completed(drawn.estimate, each) for each in poses)
+    return tuple(_select(drawn, each, records) for each in completed)
 
 
 def _select(drawn: RobotBelief, poses: PoseBatch, records: int) -> PoseBatch:

@@ -304,9 +304,10 @@ class Assumptions:
         if known is not None and not np.array_equal(known.warmer[rows[rows >= 0]], warmer[rows >= 0]):
             known, rows = None, np.full(len(labels), -1)
         new = measurements.subset(order[rows < 0])
-        deviations = frames.deviations(new.deviations)
-        commands = CommandedPoses.of(mechanism, new.poses, candidates, self.branch, new.joints)
-        placed = Placement(mechanism, self.prior.centre, commands.poses, new.joints)
+        deviations, legs = frames.deviations(new.deviations), mechanism.joint_count
+        new_joints = new.joints.reshape(len(new), legs)  # no records do not tell of how many joints
+        commands = CommandedPoses.of(mechanism, new.poses, candidates, self.branch, new_joints)
+        placed = Placement(mechanism, self.prior.centre, commands.poses, new_joints)
         joints = self.expansion.joints_without(placed, warmer[rows < 0])
         if known is not None:
             joints = _interleaved(known.joints, rows, joints)
@@ -330,7 +331,7 @@ class Assumptions:
             joints=joints,
             deviations=deviations,
             times_s=measurements.times_s[order],
-            directions=measurements.directions[order],
+            directions=measurements.directions[order].reshape(len(labels), legs),
             warmer=warmer,
             holds_at=self.expansion.holds_at(measurements),
             first_rows=first_rows_of(labels[:, 0]),

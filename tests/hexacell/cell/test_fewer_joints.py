@@ -4,6 +4,7 @@ import dataclasses
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from drivers.controllers.adapter.controller import AdapterController
@@ -13,13 +14,16 @@ from drivers.controllers.adapter.options import Program
 from drivers.controllers.linuxcnc.gcode import timed_move
 from drivers.controllers.opcua.options import OpcUaOptions
 from drivers.controllers.poses import agree, from_wire, on_wire
+from hexacell.campaign.planner import Plan
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.errors import DeviceError, FileError, HexacellError, UsageError
+from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.csv_file import read_measurements, write_measurements
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.plugins import Group, created
+from hexacell.robot.model import robot_of
 from hexacell.services.offline import fit_measurements, next_pose
 
 
@@ -145,3 +149,17 @@ def test_a_design_that_no_arm_holds_is_refused_by_name(tmp_path) -> None:
     assert config.read_text() != bundled.config_path.read_text()
     with pytest.raises(HexacellError, match="singular"):
         next_pose(load_cell(tmp_path / "cell.toml"), MeasurementSet(()))
+
+
+def test_a_calibrated_machine_whose_axes_are_not_square_has_plans_too() -> None:
+    """Its level platform is turned by the skew; no records do not tell of how many joints they are."""
+    cell = five_legs()
+    robot = robot_of(cell)
+    skewed = Geometry.of(robot.mechanism.parameters, robot.controller.document() | {"skew": [0.0015]})
+    robot = robot.with_controller(skewed)
+    plan = Plan(cell.settings, robot)
+    assert [len(poses) for poses in plan.planned_sets] == [cell.settings.identification.orientations] * 7
+    assert plan.planned_budget is not None
+    assert robot.problem(MeasurementSet(())).joints.shape == (0, 5)
+    level = robot.to_command(robot.from_commands([Pose(0.0, 0.0, 780.0)]).pose(0))
+    assert level.as_tuple() == pytest.approx((0.0, 0.0, 780.0, 0.0, 0.0, -np.degrees(0.0015)), abs=1e-9)

@@ -5,6 +5,8 @@ it fits in any case: a greedy maximin (space-filling) design (Johnson, Moore & Y
 and Inference 26, 1990).
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from hexacell.design.candidates import ReachableTargets, reachable_targets
@@ -58,6 +60,8 @@ def select_validation_poses(
     inside = _stays_inside(belief, actual)
     if not inside[0]:
         raise LimitError(f"the actual pose at the command {poses.pose(0)} is not within the limits")
+    # The ball stays inside the travel on the way, too, wherever the gauges will be zeroed.
+    belief = replace(belief, limits=limits.surely_zeroed())
     selected = _select_farthest(belief, poses[inside], actual.poses[inside], used, count)
     if len(selected) < count:
         raise LimitError(

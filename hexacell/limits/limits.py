@@ -140,6 +140,10 @@ class Limits:
             return self
         return replace(self, zeroed=self.gauges.room(shown_mm))
 
+    def surely_zeroed(self) -> Limits:
+        """These limits wherever the gauges' plungers will stand, if they are mounted well enough."""
+        return self if self.gauges is None else replace(self, zeroed=self.gauges.sure_room)
+
     @property
     def joint_ranges(self) -> tuple[tuple[float, float], ...]:
         """Smallest and largest joint variable of each leg, mm."""

@@ -11,7 +11,8 @@ from hexacell.design.candidates import orientations
 from hexacell.design.validation_poses import select_validation_poses
 from hexacell.errors import LimitError
 from hexacell.kinematics.pose import FrameTransform, Pose, PoseBatch
-from hexacell.motion.path_check import is_clear
+from hexacell.limits.gauge_travel import GaugeTravel
+from hexacell.motion.path_check import LinesFrom, ball_position, is_clear
 from tests.geometries import hexaglide_geometry
 from tests.hexacell.conftest import reached
 
@@ -81,6 +82,20 @@ def test_lines_from_one_to_the_next_and_back_to_the_first_are_clear(chosen, know
     rows = list(range(COUNT))
     for start, end in [*pairwise(rows), (COUNT - 1, 0)]:
         assert is_clear(know(much), chosen[[start]], chosen[[end]])
+
+
+def test_on_the_way_the_ball_stays_where_any_mounted_gauge_has_room(know, much, limits, paper):
+    """Plungers may stand 2 mm beside the middle of 10 mm: 3 mm are sure to be left, on wide turns too."""
+    gauges = GaugeTravel(TRAVEL_MM, (TRAVEL_MM,) * 3, (0.0,) * 3, mounting_mm=2.0)
+    belief = know(much, limits=replace(limits, gauges=gauges))
+    wide = orientations(512, float(np.radians(70.0)), seed=2)
+    chosen = select_validation_poses(belief, paper.points[2], 8, wide)
+    reference = ball_position(belief, chosen[[0]])
+    assert reference is not None
+    rows = list(range(8))
+    for start, end in [*pairwise(rows), (7, 0)]:
+        way = LinesFrom(belief, chosen[[start]], reference).check(chosen[[end]]).actual.positions
+        assert np.abs(way - reference).max() <= 3.0
 
 
 def test_a_pose_beyond_a_singularity_is_not_selected_though_it_is_farthest(know, paper, limits):

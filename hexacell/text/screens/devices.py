@@ -83,7 +83,7 @@ def _encoder_card(encoders: Shown[EncoderSample], later_s: float) -> Card:
     rows = (len(numbered) + 1) // 2
     pairs = zip_longest(numbered[:rows], numbered[rows:], fillvalue="")
     lines = [f"{left}  {right}".rstrip() for left, right in pairs]
-    return Card("encoders", "ok", Urgency.GOOD, f"{len(numbered)} positions, {sample.unit}", (*lines, age))
+    return Card("encoders", "ok", Urgency.GOOD, f"positions, {sample.unit}", (*lines, age))
 
 
 def _controller_card(controller: Shown[ControllerStatus], later_s: float) -> Card:

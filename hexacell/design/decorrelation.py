@@ -80,7 +80,7 @@ def _trials(belief: RobotBelief, found: Identification) -> Iterator[_Trial]:
             continue
         records = predict_records(belief, zero, targets)
         spread = SAFETY_SIGMAS * records.sigma
-        inside = belief.limits.within_travel(np.zeros(3), spread, TRAVEL_SHARE, surely=True)
+        inside = belief.limits.surely_zeroed().within_travel(np.zeros(3), spread, TRAVEL_SHARE)
         factors = update_factors(belief.joint_covariance, records.jacobian, records.covariance)
         for row in np.flatnonzero(inside).tolist():
             yield _Trial(point, targets.poses.rotations[row], commands[[row]], factors[row])

@@ -84,7 +84,7 @@ def _stays_inside(belief: RobotBelief, actual: ActualPoses) -> Mask:
     deviation, spread = actual.poses.positions - actual.poses.positions[0], SAFETY_SIGMAS * sigma
     stopped = np.hypot(spread, CHANCE_SIGMAS * chance)
     # They are chosen long before the gauges are placed there.
-    inside = belief.limits.within_travel(deviation, spread, TRAVEL_SHARE, surely=True)
+    inside = belief.limits.surely_zeroed().within_travel(deviation, spread, TRAVEL_SHARE)
     inside &= belief.limits.within_travel(deviation, stopped, TRAVEL_SHARE)
     inside[0] = True
     inside &= actual.found

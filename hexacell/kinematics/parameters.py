@@ -118,7 +118,9 @@ class ParameterKind:
         if self.default is not None and self.components:
             raise ValueError(f"{self.symbol} has a default, so it must be a single number a leg")
         if self.has_ball_offset and self.components not in {("x", "y", "z"), ("x", "y")}:
-            raise ValueError(f"{self.symbol} takes the ball's offset, so its components must be x, y, z")
+            raise ValueError(
+                f"{self.symbol} takes the ball's offset, so its components must be x, y, z or x, y"
+            )
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -245,11 +247,6 @@ class ParameterSet:
         """For each parameter the first of its :attr:`places`."""
         first = dict(reversed(self.places))
         return np.array([first[row] for row in range(len(self))], dtype=np.intp)
-
-    @cached_property
-    def further_places(self) -> tuple[tuple[int, int], ...]:
-        """Parameters on which several constraints depend, each with its other places."""
-        return tuple((row, place) for row, place in self.places if place != self.first_places[row])
 
     def by_constraint(self, changes: Array) -> Array:
         """Changes (P, ...) of the parameters as those (6, c, ...) of what each constraint depends on."""

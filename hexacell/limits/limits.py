@@ -117,16 +117,12 @@ class Limits:
         x, y, z = self.gauges.half_mm
         return 2.0 * x, 2.0 * y, 2.0 * z
 
-    def within_travel(
-        self, deviations: Array, spread: Array | float = 0.0, share: float = 1.0, *, surely: bool = False
-    ) -> Mask:
+    def within_travel(self, deviations: Array, spread: Array | float = 0.0, share: float = 1.0) -> Mask:
         """Which deviations (..., 3), mm, in the convention's frames stay within a share of the room.
 
-        The ``spread`` (..., 3) is along the gauges. With ``surely`` the room is that of any station
-        that is mounted well enough.
+        The ``spread`` (..., 3) is along the gauges.
         """
-        room = self.gauges.sure_room if surely and self.gauges is not None else self.room
-        return room.holds(deviations @ self.frames.base, spread, share)
+        return self.room.holds(deviations @ self.frames.base, spread, share)
 
     def sigma_along_gauges(self, covariance: Array) -> Array:
         """Standard deviations (..., 3) of what gauges show, by a covariance in the convention."""
